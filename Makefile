@@ -36,11 +36,13 @@ test: $(TEST_TOOLS)
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE)
 
 test-slow: $(TEST_TOOLS)
-	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m slow
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "slow and not study"
 
-# Once a week in CI: tests that are more of a study, each with a faster one among the slow tests.
+# Once a week in CI: tests that are more of a study, each with a faster one among the slow tests. Those in
+# Chromium measure times, so they come last, alone.
 test-studies: $(TEST_TOOLS)
-	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m study
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "study and not browser"
+	$(BIN)/python -m pytest tests/browser -m study
 
 # The property and statistical tests, slow ones too, with new examples and new seeds: some minutes.
 # The seed is printed first; the same run again: make test-fresh SEED=123
@@ -52,7 +54,7 @@ test-fresh: $(TEST_TOOLS)
 
 # In Chromium, which has to be installed; without it the tests are skipped.
 test-browser: $(TEST_TOOLS)
-	$(BIN)/python -m pytest tests/browser -m browser
+	$(BIN)/python -m pytest tests/browser -m "browser and not study"
 
 # Damaged files against the command line, some 2 a second; the same seed gives the same cases. What
 # it finds lies in run/fuzz/findings. The first round makes the valid files, for a minute or two.
@@ -87,9 +89,12 @@ docs: doctest
 	$(BIN)/python -m pytest tests/architecture/test_docs_links.py
 
 # All pages, the reference and a gallery that is drawn now, as a site that works offline: build/site. A
-# link that leads nowhere and an example that fails end it.
+# link that leads nowhere and an example that fails end it. GALLERY=0: the gallery's texts without pictures,
+# in half the time; CI draws them once a week.
+GALLERY := 1
+
 site: $(DEV_TOOLS)
-	$(BIN)/sphinx-build -W --keep-going -q -c docs/site -b html . build/site
+	$(BIN)/sphinx-build -W --keep-going -q -D plot_gallery=$(GALLERY) -c docs/site -b html . build/site
 	$(BIN)/driftwalk play --save build/site/playground.html --overwrite
 	@echo "site: build/site/index.html"
 
@@ -104,8 +109,8 @@ format: $(DEV_TOOLS)
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $(CPP)
 
-# The native core alone, no Python: once under the address and undefined-behaviour sanitizers, once
-# without any processor-specific code.
+# The native core alone, no Python, under the address and undefined-behaviour sanitizers: every instruction
+# set (once a week in CI), or without any processor-specific code, which takes half the time.
 cpp-test: $(DEV_TOOLS)
 	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/cpp-test sanitize
 

@@ -61,6 +61,8 @@ def main() -> None:
             print(f"wheel: {name} of the map {read:.6g}, truth {truth:.6g}")
             if not abs(read - truth) < error:
                 raise SystemExit(f"wheel: {name} of the map is off by more than {error:g}")
+        if found["fit"]["verdict"] != "explains":
+            raise SystemExit(f"wheel: the verdict of the fit is {found['fit']['verdict']!r}")
         if not (Path(folder) / "demo" / "report.html").is_file():
             raise SystemExit("wheel: the demo left no page")
     print("wheel: passed")

@@ -7,7 +7,8 @@ thread. Then worlds of 4 blocks for 300 s in a batch, on one thread, with a chan
 the flow and the force every 5 s, by the class of each world, against one live tank after another.
 Checked, else the script fails: the blocks end where the batch kernel in double precision puts them,
 64 blocks take less than 5 ms in the median, the batch in double precision ends where a live tank
-with the same changes does, and the one in single precision is 10 times as fast as live tanks.
+with the same changes does and is 5 times as fast as live tanks, and the one in single precision 10
+times.
 """
 
 from __future__ import annotations
@@ -93,23 +94,28 @@ def time_batches(worlds: int) -> None:
     def live() -> dw.LiveTank:
         return run_live(dw.LiveTank(study, case.flow))
 
-    tank, reference = live(), batch(1, backend="reference")
+    tank, reference = live(), batch(8, backend="reference")
     same = np.array_equal(reference.state()["pose"][0, :, 0], tank.x)
     check(same and tank.outcome == reference.outcome[0], "a batch does not end as a live tank does")
     ways = {
         "live tank": live,
-        "batch, double precision": lambda: batch(4, backend="reference"),
+        "batch, double precision": lambda: batch(worlds, backend="reference"),
+        "the same, complete worlds rest": lambda: batch(
+            worlds, backend="reference", complete="rests"
+        ),
         "batch": lambda: batch(worlds),
         "batch, complete worlds rest": lambda: batch(worlds, complete="rests"),
     }
-    counts = dict(zip(ways, (1, 4, worlds, worlds), strict=True))
+    counts = {name: 1 if name == "live tank" else worlds for name in ways}
     times = interleaved(ways, rounds=5)
     print(f"Processor time of a world of {PERIODS * PERIOD_S:g} s, a decision every {PERIOD_S:g} s")
     taken = {name: np.array(times[name].processor) / count for name, count in counts.items()}
     for name, seconds in taken.items():
         ratio = ratio_of(taken, name)
-        print(f"{name:>28} {1e3 * np.median(seconds):>7.2f} ms {ratio:>6.1f} x")
-    check(ratio_of(taken, "batch") >= 10, "a batch is not 10 times as fast as live tanks")
+        least, middle = 1e3 * seconds.min(), 1e3 * np.median(seconds)
+        print(f"{name:>30} {middle:>7.2f} ms, {least:>6.2f} ms at least {ratio:>6.1f} x")
+    for name, least in (("batch", 10), ("batch, double precision", 5)):
+        check(ratio_of(taken, name) >= least, f"{name} is not {least} times as fast as live tanks")
 
 
 def ratio_of(taken: dict[str, Any], name: str) -> float:

@@ -1,10 +1,8 @@
-// A batch of worlds that keep their state: which of them go on together, and the kernel in double
-// precision.
+// A batch of worlds that keep their state: which of them go on together.
 #include "driftwalk/assembly/tank_batch.hpp"
 
 #include "driftwalk/assembly/memory.hpp"
-#include "driftwalk/assembly/tank_group.hpp"
-#include "driftwalk/physics/laws/mixed.hpp"
+#include "driftwalk/dispatch.hpp"
 #include "driftwalk/simulate/threads.hpp"
 
 #include <algorithm>
@@ -14,6 +12,20 @@
 namespace driftwalk {
 
 namespace {
+TankKernels chosen_kernels() {
+#if defined(DRIFTWALK_X86_LANES)
+  switch (chosen_instruction_set()) {
+  case InstructionSet::avx512:
+    return tank_kernels_avx512();
+  case InstructionSet::avx2:
+    return tank_kernels_avx2();
+  case InstructionSet::baseline:
+    break;
+  }
+#endif
+  return tank_kernels_baseline();
+}
+
 // Room for the events of one step of a pack. A block has four bonds.
 class EventRoom {
 public:
@@ -80,9 +92,9 @@ TankBatch::TankBatch(std::vector<TankFlow> flows, std::vector<std::uint64_t> key
                      const double* start, const LiveBlocks* joined, int threads)
     : flows_(std::move(flows)), key_(std::move(key)) {
   const std::size_t worlds = key_.size(), rows = worlds * static_cast<std::size_t>(blocks());
+  const TankKernels kernels = chosen_kernels();
   const bool twice = flows_.front().twice != nullptr;
-  state_.resize(
-      worlds * (twice ? KeptLayout<double>::bytes : chosen_assembly_kernel().kept_bytes)(blocks()));
+  state_.resize(worlds * (twice ? kernels.twice.kept_bytes : kernels.single.kept_bytes)(blocks()));
   pose_.assign(start, start + 3 * rows);
   velocity_.resize(3 * rows);
   assembly_.resize(rows);
@@ -125,39 +137,33 @@ void TankBatch::run(const TankSettings& settings, TankGroup group, int threads) 
   group.now = now();
   group.status = status_.data();
   group.last_event = last_event_.data();
-  const auto run_packs = [&](int lanes, std::size_t lane_bytes, const auto& go_on) {
-    const Packs packs(settings, worlds(), blocks() > most_blocks_all_pairs ? 1 : lanes);
+  const auto run_packs = [&](const auto& kernel, const auto& run_of) {
+    const Packs packs(settings, worlds(), blocks() > most_blocks_all_pairs ? 1 : kernel.lanes);
     run_tasks(static_cast<std::int64_t>(packs.begin.size()) - 1, threads, [&] {
-      return [&, memory = std::make_unique<AssemblyMemory>(blocks(), lane_bytes),
-              room = EventRoom(blocks(), lanes)](std::int64_t pack) mutable {
-        const std::size_t begin = packs.begin[static_cast<std::size_t>(pack)];
-        const std::size_t end = packs.begin[static_cast<std::size_t>(pack) + 1];
-        const std::int64_t first = packs.world[begin];
-        const TankFlow& flow = flows_[static_cast<std::size_t>(settings.flow[first])];
-        AssemblyRules rules = flow.rules;
-        rules.latching = static_cast<Latching>(settings.latching[first]);
-        TankGroup own = group;
-        own.flow_scale = settings.flow_scale[first];
-        own.world = packs.world.data() + begin;
-        own.count = static_cast<int>(end - begin);
-        own.flow_start = flow.start.empty() ? nullptr : flow.start.data();
-        own.events = room.outputs();
-        go_on(flow, rules, own, memory->scratch());
-      };
+      return
+          [&, memory = std::make_unique<AssemblyMemory>(blocks(), kernel.scratch_bytes(blocks())),
+           room = EventRoom(blocks(), kernel.lanes)](std::int64_t pack) mutable {
+            const std::size_t begin = packs.begin[static_cast<std::size_t>(pack)];
+            const std::size_t end = packs.begin[static_cast<std::size_t>(pack) + 1];
+            const std::int64_t first = packs.world[begin];
+            const TankFlow& flow = flows_[static_cast<std::size_t>(settings.flow[first])];
+            AssemblyRules rules = flow.rules;
+            rules.latching = static_cast<Latching>(settings.latching[first]);
+            TankGroup own = group;
+            own.flow_scale = settings.flow_scale[first];
+            own.world = packs.world.data() + begin;
+            own.count = static_cast<int>(end - begin);
+            own.flow_start = flow.start.empty() ? nullptr : flow.start.data();
+            own.events = room.outputs();
+            kernel.go_on(run_of(flow), rules, own, memory->scratch());
+          };
     });
   };
+  const TankKernels kernels = chosen_kernels();
   if (flows_.front().twice != nullptr) {
-    run_packs(1, PackMemory<double>::bytes(blocks()),
-              [](const TankFlow& flow, const AssemblyRules& rules, const TankGroup& own,
-                 AssemblyScratch& scratch) {
-                run_group<double>(flow.twice->view(), rules, own, scratch);
-              });
+    run_packs(kernels.twice, [](const TankFlow& flow) -> auto& { return flow.twice->view(); });
   } else {
-    const AssemblyKernel kernel = chosen_assembly_kernel();
-    run_packs(
-        kernel.lanes, kernel.scratch_bytes(blocks()),
-        [&](const TankFlow& flow, const AssemblyRules& rules, const TankGroup& own,
-            AssemblyScratch& scratch) { kernel.go_on(flow.single->view(), rules, own, scratch); });
+    run_packs(kernels.single, [](const TankFlow& flow) -> auto& { return flow.single->view(); });
   }
 }
 

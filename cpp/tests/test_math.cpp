@@ -167,6 +167,50 @@ void check_doubles() {
   CHECK(driftwalk::log(0.0) == -INFINITY && driftwalk::exp(-1000.0) == 0.0);
 }
 
+bool same_bits(double a, double b) {
+  return std::memcmp(&a, &b, sizeof a) == 0 || (std::isnan(a) && std::isnan(b));
+}
+
+// Every function of a pack of doubles against that of one, far beyond what the kernels ask too.
+template <int N>
+void check_double_packs() {
+  using Pack = driftwalk::DoublePack<N>;
+  const double far[] = {0.0, -0.0, 1e300, -1e300, INFINITY, NAN, 1e5, -1e-310, 700, -701};
+  std::uint64_t word = 1;
+  const auto any = [&] {
+    word = word * 6364136223846793005u + 1442695040888963407u;
+    const double share = double(word >> 11) * 0x1p-53;
+    return word % 97 == 0 ? far[word / 97 % std::size(far)] : 17.3 * (share - 0.5);
+  };
+  for (int k = 0; k < 20000; ++k) {
+    Pack x, y, sine, cosine;
+    for (int lane = 0; lane < N; ++lane) {
+      x.set(lane, any());
+      y.set(lane, any());
+    }
+    driftwalk::sincos(x, sine, cosine);
+    const Pack log = driftwalk::log(x), exp = driftwalk::exp(x), root = driftwalk::sqrt(x);
+    const Pack most = driftwalk::max(x, y), least = driftwalk::min(x, y);
+    const Pack size = driftwalk::abs(x), with_sign = driftwalk::copy_sign(x, y);
+    const Pack near = driftwalk::clamp_to(x, -1e4, 1e4);
+    const Pack whole = driftwalk::to_real(near, driftwalk::truncate(near));
+    for (int lane = 0; lane < N; ++lane) {
+      const double a = x[lane], b = y[lane];
+      double s, c;
+      driftwalk::sincos(a, s, c);
+      CHECK(same_bits(sine[lane], s) && same_bits(cosine[lane], c));
+      CHECK(same_bits(log[lane], driftwalk::log(a)) && same_bits(exp[lane], driftwalk::exp(a)));
+      CHECK(same_bits(root[lane], driftwalk::sqrt(a)));
+      CHECK(same_bits(most[lane], driftwalk::max(a, b)));
+      CHECK(same_bits(least[lane], driftwalk::min(a, b)));
+      CHECK(same_bits(size[lane], driftwalk::abs(a)));
+      CHECK(same_bits(with_sign[lane], driftwalk::copy_sign(a, b)));
+      CHECK(whole[lane] == std::trunc(driftwalk::clamp_to(a, -1e4, 1e4)));
+      CHECK(same_bits(Pack(a)[lane], a));
+    }
+  }
+}
+
 // Packs against the plain rule, at equal, unordered and signed-zero operands.
 void check_select_rules() {
   const float values[] = {0.0f, -0.0f, 1.0f, -1.0f, NAN, INFINITY, -INFINITY, 3.5f};
@@ -232,6 +276,8 @@ int main() {
   check_exp();
   check_sincos();
   check_doubles();
+  check_double_packs<2>();
+  check_double_packs<4>();
   check_select_rules();
   check_wrap_angle();
   check_wide_products();

@@ -1,8 +1,11 @@
-// The batch of tanks: the bits of live worlds through any sequence of changes, worlds that do not
-// depend on each other, copies, joined starts, and steps without an allocation.
+// The batch of tanks: the bits of live worlds through any sequence of changes on each instruction
+// set, worlds that do not depend on each other, copies, joined starts, and steps without an
+// allocation.
 #include "check.hpp"
 #include "driftwalk/assembly/live.hpp"
 #include "driftwalk/assembly/tank_batch.hpp"
+#include "driftwalk/dispatch.hpp"
+#include "environment.hpp"
 #include "synthetic_assembly.hpp"
 
 #include <atomic>
@@ -87,7 +90,8 @@ struct Basin {
   }
 };
 
-// What every world has in a period; a world keeps its flow.
+// What every world has in a period; a world keeps its flow. Every sixth world has the flow, factor
+// and latching of the first, so that they share a vector.
 struct Settings {
   std::vector<std::int32_t> flow, latching;
   std::vector<double> flow_scale, drag, force;
@@ -95,8 +99,8 @@ struct Settings {
   Settings(std::size_t worlds, synthetic::Uniform& any) {
     for (std::size_t w = 0; w < worlds; ++w) {
       flow.push_back(w % 2);
-      latching.push_back(std::int32_t(1.5 * (any() + 1)) % 3);
-      flow_scale.push_back(any() < 0 ? 0.5 : 1.0);
+      latching.push_back(w < 6 ? std::int32_t(1.5 * (any() + 1)) % 3 : latching[w - 6]);
+      flow_scale.push_back(w < 6 ? (any() < 0 ? 0.5 : 1.0) : flow_scale[w - 6]);
       drag.push_back(0.5 + 0.4 * any());
       force.push_back(2e-3 * (any() + 1));
     }
@@ -119,8 +123,7 @@ bool same(const TankBatch& a, const TankBatch& b) {
          a.cell() == b.cell() && a.quarter() == b.quarter() && a.last_event() == b.last_event();
 }
 
-void check_bits_of_live_worlds(int blocks, double bond_rate) {
-  constexpr std::size_t worlds = 5;
+void check_bits_of_live_worlds(int blocks, double bond_rate, std::size_t worlds) {
   const Basin basin(blocks, bond_rate);
   const Crowd crowd = crowd_in(basin, blocks, worlds);
   TankBatch batch(basin.flows(true), crowd.key, crowd.start.data(), nullptr, 2);
@@ -275,9 +278,17 @@ void check_allocations(bool in_doubles) {
 } // namespace
 
 int main() {
-  check_bits_of_live_worlds(5, 0);
-  check_bits_of_live_worlds(5, 0.5);
-  check_bits_of_live_worlds(30, 0);
+  using driftwalk::InstructionSet;
+  for (const InstructionSet set :
+       {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
+    if (driftwalk::is_available(set)) {
+      environment::choose_instruction_set(driftwalk::name(set));
+      check_bits_of_live_worlds(5, 0, 60);
+      check_bits_of_live_worlds(5, 0.5, 20);
+      check_bits_of_live_worlds(30, 0, 3);
+    }
+  }
+  environment::choose_instruction_set("");
   check_worlds_apart(4);
   check_worlds_apart(26);
   for (const bool in_doubles : {false, true}) {

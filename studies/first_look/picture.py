@@ -56,11 +56,14 @@ def draw(fit: Path, four: Path, target: Path) -> None:
         bar.set_position((*place, 0.09 / WIDTH_IN, AXES_IN / HEIGHT_IN))
         bar.set_aspect("auto")
     with xr.open_dataset(four / "distribution.nc", engine="h5netcdf") as shares:
-        # What nearly no run builds needs no bar in a first look: the caption says so.
+        # What nearly no run builds needs no bar in a first look: the label says so.
         shown = shares.isel({"class": shares["proportion"].values >= LEAST_SHARE})
         dw.plot.outcomes(shown, axes[2])
     # The caption says how many runs and which intervals.
     axes[2].get_legend().remove()
+    axes[2].set_xlabel(
+        f"classes of {100 * LEAST_SHARE:g} % or more", labelpad=axes[2].xaxis.labelpad
+    )
     axes[2].set_title("next: what four blocks build")
     axes[2].spines[["top", "right"]].set_visible(False)
     figure.savefig(target, dpi=DOTS_PER_INCH)

@@ -3,9 +3,10 @@
     python studies/outcomes/run.py FOLDER        (some ten minutes on two cores; goes on if killed)
 
 C_d 0.36 to 0.54 and sigma_F 0.3 to 1.0 mN in the bundled flow, 4 blocks, 300 s. The emulator has
-128 nodes of 300 runs. 200 truths, drawn evenly from the ranges, choose the power of the likelihood
-of each kind of data, as the self-check does; 200 others measure the coverage. Every data set is 100
-runs. A further 40 truths at C_d 0.8 to 1.2 say how often sigma_F is determined there.
+128 nodes of 300 runs. 400 truths are drawn evenly from the ranges: each half of them chooses the
+power of the likelihood of each kind of data, as the self-check does, with which the other half
+measures the coverage. Every data set is 100 runs. A further 80 truths at C_d 0.8 to 1.2 say how
+often sigma_F is determined there.
 """
 
 from __future__ import annotations
@@ -49,19 +50,26 @@ def row_of(
     truth: np.ndarray,
     sets: list[list[Record]],
 ) -> dict[str, Any]:
-    """Return power, coverage and widths of a kind of data; half of the truths choose the power."""
+    """Return powers, coverage and widths of a kind of data; each half chooses the other's power."""
     categories = Categories.of(kind, known)
     emulator = Emulator.fitted(node, categories.table(known))
     point = qmc.Sobol(len(NAMES), seed=7).random(POINTS)
     both = log_likelihoods(*emulator.predict(np.vstack([point, truth])), categories.table(sets))
-    own = both[np.arange(len(truth)), POINTS + np.arange(len(truth))]
-    half = len(truth) // 2
-    chosen = self_check(point, truth[:half], both[:half, :POINTS], own[:half])
-    row = {"kind": kind, "power": chosen.power, "chosen_coverage": chosen.joint}
-    for label, power in (("", chosen.power), ("_at_power_1", 1.0)):
-        power = power if np.isfinite(power) else REGION_POLICY.powers[-1]
-        joint, marginal, width = covered(
-            point, truth[half:], both[half:, :POINTS], own[half:], power=power
+    level, own = both[:, :POINTS], both[np.arange(len(truth)), POINTS + np.arange(len(truth))]
+    halves = [slice(None, len(truth) // 2), slice(len(truth) // 2, None)]
+    chosen = [self_check(point, truth[one], level[one], own[one]).power for one in halves]
+    row: dict[str, Any] = {"kind": kind, "powers": chosen}
+    for label, powers in (("", chosen[::-1]), ("_at_power_1", [1.0, 1.0])):
+        powers = np.nan_to_num(powers, nan=REGION_POLICY.powers[-1])
+        joint, marginal, width = (
+            np.concatenate(part)
+            for part in zip(
+                *(
+                    covered(point, truth[one], level[one], own[one], power=power)
+                    for one, power in zip(halves, powers, strict=True)
+                ),
+                strict=True,
+            )
         )
         row[f"coverage{label}"] = float(joint.mean())
         row[f"interval_coverage{label}"] = marginal.mean(axis=0).tolist()

@@ -52,7 +52,7 @@ TABLE: Final = "| name | what |\n|---|---|\n"
 def all_pages() -> dict[Path, str]:
     """Return the pages by their paths: of all names, of each room, of each function and class."""
     rooms = (*ROOMS, ERRORS)
-    return {
+    pages = {
         FOLDER / ALL: _page_of_all(),
         **{FOLDER / f"{_file(name)}.md": _room_page(name) for name in rooms},
         **{
@@ -62,6 +62,13 @@ def all_pages() -> dict[Path, str]:
             if _is_documented(getattr(_room(name), public))
         },
     }
+    return {path: _with_links(path, text) for path, text in pages.items()}
+
+
+def _with_links(path: Path, text: str) -> str:
+    """Return a page on which each other page that a docstring names is a link."""
+    up = "../" * (len(path.relative_to(FOLDER).parts) + 1)
+    return re.sub(r"`?\bdocs/([\w/-]+\.md)`?(?![\w)\]])", rf"[docs/\1]({up}\1)", text)
 
 
 def _page_of_all() -> str:

@@ -1,5 +1,5 @@
 """Benchmarks and studies start: a benchmark at its smallest size, a study, which takes hours, with
-``--help``, and what they use of driftwalk exists."""
+``--help``, and what they and the gallery use of driftwalk exists."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 ALIASES = {"dw": "driftwalk", "_core": "driftwalk._core"}
-SCRIPTS = [path for folder in ("benchmarks", "studies") for path in (ROOT / folder).rglob("*.py")]
+FOLDERS = ("benchmarks", "studies", "docs/site/gallery")
+SCRIPTS = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
 
 
 def used_names(path: Path) -> Iterator[tuple[str, str]]:
@@ -62,17 +63,25 @@ LACKING = 77
 LATE = re.compile(r"a frame of \d+ blocks takes|costs [\d.]+ times the paper's law")
 """Ends of a benchmark that a busy machine explains."""
 STUDIES = sorted({path.parent for path in SCRIPTS if "studies" in path.parts})
-# Where a script has a parser it runs up to its --help, else only its definitions run.
+# Where a script has a parser it runs up to its --help, else only its definitions run. Studies have
+# files of the same names, so each leaves nothing to the next.
 START = """
 import pathlib, runpy, sys
-for name in sys.argv[1:]:
-    asked = "argparse" in pathlib.Path(name).read_text(encoding="utf-8")
-    sys.argv = [name, "--help"]
-    print("starting", name, flush=True)
-    try:
-        runpy.run_path(name, run_name="__main__" if asked else "started")
-    except SystemExit as end:
-        assert asked and not end.code, end
+path, modules = sys.path[:], set(sys.modules)
+folders = [pathlib.Path(word) for word in sys.argv[1:]]
+for folder in folders:
+    sys.path[:] = [str(folder), *path]
+    for script in sorted(folder.glob("*.py")):
+        asked = "argparse" in script.read_text(encoding="utf-8")
+        sys.argv = [str(script), "--help"]
+        print("starting", script, flush=True)
+        try:
+            runpy.run_path(str(script), run_name="__main__" if asked else "started")
+        except SystemExit as end:
+            assert asked and not end.code, end
+    for name in set(sys.modules) - modules:
+        if pathlib.Path(getattr(sys.modules[name], "__file__", None) or "/").parent in folders:
+            del sys.modules[name]
 """
 
 
@@ -104,12 +113,11 @@ def test_a_benchmark_runs_at_its_smallest_size(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("folder", STUDIES, ids=lambda folder: folder.name)
-def test_every_script_of_a_study_starts(folder: Path) -> None:
+def test_every_script_of_a_study_starts() -> None:
     """Its modules are found, its definitions run, and so does its parser."""
-    scripts = sorted(folder.glob("*.py"))
-    done = started("-c", f"import sys; sys.path.insert(0, {str(folder)!r})\n{START}", *scripts)
+    done = started("-c", START, *STUDIES)
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
+    assert all(f"starting {path}\n" in done.stdout for path in SCRIPTS if path.parent in STUDIES)
 
 
 SOURCES_OF_STUDIES = (

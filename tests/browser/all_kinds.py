@@ -159,6 +159,11 @@ def every_kind() -> list[dict[str, Any]]:
             "points": {"x": [0.0, 1.0], "y": [1.0, 0.0], "names": ["a", "b"], "values": None},
             "arrows": [{"name": "along", "x": 1.0, "y": 0.5, "cells": PAIR}],
         },
+        {
+            **{"kind": "class_graph", "height": 120.0},
+            "classes": [{"class": "2", "cells": PAIR, "x": 1.0, "y": 0.5}],
+            "arrows": [{"x": [0.0, 1.0], "y": [0.5, 0.5], "at": 0.4, "share": 0.7, "label": "9"}],
+        },
         replay(),
         {"kind": "table", "columns": ["first", "second"], "rows": [["a word", 1.0], ["b", None]]},
         {

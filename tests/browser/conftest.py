@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from finished_run import write_finished_run
 
+from browser.readable import faults
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
@@ -111,7 +113,8 @@ class Visit:
 def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
     """Return a function that opens a browser of its own; only what is allowed is loaded.
 
-    At the end no page may have asked for anything else, nor complained.
+    At the end no page may have asked for anything else, nor complained; and everyone can read it,
+    name its controls and reach them.
     """
     visits: list[Visit] = []
 
@@ -124,8 +127,10 @@ def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
         return visits[-1]
 
     yield start
+    unfit = [fault for one in visits for fault in faults(one.page)]
     for one in visits:
         one.page.context.close()
+    assert unfit == []
     assert [url for one in visits for url in one.refused] == []
     assert [words for one in visits for words in one.complaints] == []
 

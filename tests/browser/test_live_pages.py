@@ -341,18 +341,24 @@ def test_bodies_of_a_motion_model(
         picture(page, "play-model-desktop")
 
 
+@pytest.mark.study
 def test_thirty_pictures_a_second_with_64_blocks(visit: Callable[..., Visit]) -> None:
-    """In a tank of 1.2 m."""
+    """In a tank of 1.2 m. In every run: a few blocks, faster than real time."""
     with served("play", "--tank", "1.2m", "--blocks", 64) as started:
         page = visit(f"http://127.0.0.1:{started.port}/").open(started.address)
         until_tank(page, "frames", 10)
         assert best_of_some_seconds(page, "frames", 30.0) >= 30.0
 
 
+@pytest.mark.study
 def test_the_blocks_come_near_the_recording(
     visit: Callable[..., Visit],
 ) -> None:
-    """One block with the parameters of the recording's truth, then with another drag."""
+    """One block with the parameters of the recording's truth, then with another drag.
+
+    In every run the server's distances are tested (tests/unit/viewer/test_playground.py), and that
+    the page shows steps.
+    """
     with served("play", "--blocks", 1) as started:
         page = visit(f"http://127.0.0.1:{started.port}/").open(started.address)
         turn(page, "speed", 0.99)

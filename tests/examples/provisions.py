@@ -10,8 +10,8 @@ import json
 import shlex
 import shutil
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -69,12 +69,16 @@ class Page:
     slow: bool = False
     """Whether the page takes more than 0.3 s of processor time."""
     weekly: bool = False
-    """Whether it takes half a minute or more of commands that other tests run in CI."""
+    """Whether it takes long for commands that other tests run in CI."""
+    parts_weekly: tuple[str, ...] = ()
+    """Texts of single commands, or of other examples, of which the same holds."""
 
     @property
-    def marks(self) -> list[pytest.MarkDecorator]:
-        """When the page runs."""
-        return [pytest.mark.study] * self.weekly or [pytest.mark.slow] * self.slow
+    def runs(self) -> Iterator[tuple[str, Page, list[pytest.MarkDecorator]]]:
+        """What is appended to the name of each run of the page, what runs, and when."""
+        yield "", self, [pytest.mark.study] * self.weekly or [pytest.mark.slow] * self.slow
+        if self.parts_weekly:
+            yield " whole", replace(self, parts_weekly=()), [pytest.mark.study]
 
 
 def _files(*provisions: Callable[[Path], Names]) -> Callable[[Path], Names]:
@@ -496,6 +500,7 @@ PAGES: dict[str, Page] = {
         numbers=Numbers.SAME,
         draws=False,
         slow=True,
+        parts_weekly=("-o discs/", "-o many/"),
     ),
     "docs/how-to/calibrate-a-moving-body.md": Page(
         provide=_active_body,
@@ -527,7 +532,7 @@ PAGES: dict[str, Page] = {
         makes=("compare/comparison.nc",),
         draws=False,
         little=True,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/design-an-experiment.md": Page(
         provide=_files(_flow("flow_true.csv"), _truth),
@@ -552,7 +557,7 @@ PAGES: dict[str, Page] = {
         instead={"circle:30cm": "circle:32cm"},
         holds=("len(known) == 2",),
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/fit.md": Page(
         provide=_files(
@@ -583,6 +588,10 @@ PAGES: dict[str, Page] = {
         holds=("bool(fit['converged'])", "flow.attrs['kind'] == 'flow_field'"),
         draws=False,
         slow=True,
+        parts_weekly=(
+            *("sensitivity fit/", "simulate fit/", "-o raft/", "-o both/", "--switching-times"),
+            *("switched/fit.nc", "-o paper/", "--compare-laws"),
+        ),
     ),
     "docs/how-to/flow-field.md": Page(
         provide=_files(_recording(), _tracks),
@@ -606,7 +615,7 @@ PAGES: dict[str, Page] = {
     "docs/how-to/take-your-tracks-elsewhere.md": Page(
         provide=_files(_one_recording, _several_worlds, _calibrated),
         makes=("tracks/README.md", "one/replicate_3.csv", "film/recording.gif", "paper/ks_map.pdf"),
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/control.md": Page(
         provide=_files(_fitted),
@@ -641,7 +650,7 @@ PAGES: dict[str, Page] = {
         holds=("found.attrs['blocks'] == 2",),
         makes=("posterior.html", "from-real/posterior.nc"),
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/sensitivity.md": Page(
         provide=_files(_calibrated, _flow("flow_true.csv", "flow.nc", "piv.csv")),
@@ -658,7 +667,7 @@ PAGES: dict[str, Page] = {
             "rules['l1_distance'].shape == (2,)",
         ),
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/yield.md": Page(
         provide=_files(_fitted),
@@ -695,7 +704,7 @@ PAGES: dict[str, Page] = {
         },
         makes=("markers.png", "recording.html", "video.mkv"),
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/use-as-a-library.md": Page(
         provide=_files(_recording(120.0), _search("study.toml")),
@@ -717,7 +726,7 @@ PAGES: dict[str, Page] = {
         },
         holds=("0.99 < data.time < 1.01", "mujoco.set_mjcb_passive(None) is None"),
         needs=("mujoco",),
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/use-a-simulator.md": Page(
         provide=_robot_in_mujoco,
@@ -740,6 +749,7 @@ PAGES: dict[str, Page] = {
         },
         draws=False,
         slow=True,
+        parts_weekly=("play run/", "play --study", "play --tank", "play --live", "play --model"),
     ),
     "docs/reference/datasets.md": Page(
         provide=_files(_search("search.toml"), _with_intervals, _minutes(recording=0.5)),

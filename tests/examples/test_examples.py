@@ -45,12 +45,18 @@ def run_page(name: str, page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=page.marks) for name, page in PAGES.items()],
+    ("name", "page"),
+    [
+        pytest.param(name, page, marks=marks, id=f"{name}{added}")
+        for name, whole in PAGES.items()
+        for added, page, marks in whole.runs
+    ],
 )
-def test_examples_of_a_page_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_of_a_page_run(
+    name: str, page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    run_page(name, PAGES[name], monkeypatch)
+    run_page(name, page, monkeypatch)
 
 
 def test_every_page_with_examples_is_run() -> None:
@@ -184,7 +190,7 @@ def test_what_is_said_about_a_page_is_on_it(name: str) -> None:
     ]
     for pattern in (*PAGES[name].not_run, *PAGES[name].numbers_of):
         assert fnmatch.filter(commands, pattern), pattern
-    for old in PAGES[name].instead:
+    for old in (*PAGES[name].instead, *PAGES[name].parts_weekly):
         assert any(old in block.text for block in blocks), old
 
 

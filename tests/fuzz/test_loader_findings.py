@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.tables.cells import as_numbers
+from driftwalk.record.tables.in_memory import as_numbers
 
 PIXELS = ("--scale", "0.001")
 
@@ -86,7 +86,7 @@ def test_a_damaged_description_is_refused(tmp_path: Path, damage: str, said: str
 def test_xml_in_an_encoding_that_nobody_knows_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.xml"
     path.write_text('<?xml version="1.0" encoding="UTF-NaN"?>\n<TrackMate version="7"></TrackMate>')
-    assert "a.xml: is damaged XML: unknown encoding" in refusal(here("info", path))
+    assert "a.xml, line 1: is damaged XML: unknown encoding" in refusal(here("info", path))
 
 
 def test_messages_about_options_name_the_file(tmp_path: Path) -> None:

@@ -62,9 +62,23 @@ def synthetic_recording(duration: float, seed: int = 5, flow=None):
 
 
 @pytest.fixture(scope="module")
-def found():
-    study = apply_overrides(dw.Study(), SMALL)
-    return dw.calibrate(synthetic_recording(400.0), study, flow=dw.tank30_flow(), threads=2)
+def early_and_found():
+    """Return what is given while the halves are computed, and the calibration."""
+    study, given = apply_overrides(dw.Study(), SMALL), []
+    whole = dw.calibration.calibrate(
+        synthetic_recording(400.0),
+        study,
+        flow=dw.tank30_flow(),
+        threads=2,
+        meanwhile=given.append,
+    )
+    (early,) = given
+    return early, whole
+
+
+@pytest.fixture(scope="module")
+def found(early_and_found):
+    return early_and_found[1]
 
 
 @pytest.mark.slow
@@ -167,20 +181,22 @@ def test_place_and_quadrant_are_where_the_world_and_the_recording_differ(found):
 
 
 @pytest.mark.slow
-def test_threads_do_not_change_a_single_bit(found):
+def test_neither_threads_nor_what_is_given_meanwhile_change_a_bit(found):
     study = apply_overrides(dw.Study(), SMALL)
-    given = []
-    again = dw.calibration.calibrate(
-        synthetic_recording(400.0),
-        study,
-        flow=dw.tank30_flow(),
-        threads=1,
-        meanwhile=given.append,
-    )
-    # One thread has no other: it is called at the end.
-    assert len(given) == 1
-    assert given[0] is again
+    again = dw.calibrate(synthetic_recording(400.0), study, flow=dw.tank30_flow(), threads=1)
+    assert_same_bits(again, found)
     assert again.identical(found)
+
+
+@pytest.mark.slow
+def test_one_thread_gives_what_figures_show_at_the_end():
+    """It has no other thread, which would draw them meanwhile."""
+    few = {"calibration.replicates": 1, "calibration.bootstrap": 8}
+    study, given = apply_overrides(dw.Study(), {**SMALL, **few}), []
+    recording, flow = synthetic_recording(60.0), dw.tank30_flow()
+    whole = dw.calibration.calibrate(recording, study, flow=flow, threads=1, meanwhile=given.append)
+    assert len(given) == 1
+    assert given[0] is whole
 
 
 @pytest.mark.study
@@ -204,13 +220,9 @@ def test_the_second_half_of_a_changing_flow_has_its_own_water():
 
 
 @pytest.mark.slow
-def test_meanwhile_gets_all_that_figures_show(found, tmp_path):
+def test_meanwhile_gets_all_that_figures_show(early_and_found, tmp_path):
     recording, flow = synthetic_recording(400.0), dw.tank30_flow()
-    given = []
-    study = apply_overrides(dw.Study(), SMALL)
-    whole = dw.calibration.calibrate(recording, study, flow=flow, threads=2, meanwhile=given.append)
-    assert_same_bits(whole, found)
-    [early] = given
+    early, whole = early_and_found
     lacking = set(whole.variables) - set(early.variables)
     assert {"second_half_ks_distance", "second_half_noise_floor"} <= lacking
     assert all(name.startswith(("first_half_", "second_half_")) for name in lacking)

@@ -17,15 +17,14 @@ from made_up_fit import made_up_fit
 from small_sensitivity import FLOW as STREAM, small
 
 import driftwalk as dw
-from driftwalk.assembly import Modes, Wanted, proportion_interval
+from driftwalk.assembly import Modes, Wanted
 from driftwalk.assembly.control.controller import Rules
 from driftwalk.assembly.control.stored import stored_modes, stored_rules
 from driftwalk.assembly.control.worlds import Setting, Worlds
-from driftwalk.core.files.shards import ShardStore
+from driftwalk.core.intervals import difference_interval
 from driftwalk.page.chapters import in_chapters
 from driftwalk.page.sections.control import trial_sections
-from driftwalk.runs import ControlPlanWork, run_work
-from driftwalk.schema.answers.control import exact_interval
+from driftwalk.runs import ControlPlanWork
 from driftwalk.schema.answers.parts import lines_of
 from driftwalk.schema.kinds.fit import FIT
 from driftwalk.schema.runs import answer_of
@@ -57,7 +56,7 @@ def test_a_plan_and_its_test_hold_what_they_say(tmp_path: Path) -> None:
     np.testing.assert_allclose(test["share"][:, -1], test["reached"])
     facts = test.attrs
     count = [round(40 * float(test["reached"][0])), round(80 * policy.attrs["reached"])]
-    limits = dw.assembly.outcomes.distribution.difference_interval(count, [40, 80], confidence=0.9)
+    limits = difference_interval(count, [40, 80], confidence=0.9)
     assert (facts["difference_low"], facts["difference_high"]) == pytest.approx(limits)
     assert facts["verdict"] == "not " * (not limits[0] <= 0.0 <= limits[1]) + "as stated"
     again = dw.try_control(policy, worlds=40)
@@ -94,12 +93,6 @@ def test_a_policy_no_better_than_one_mode_is_not_recommended() -> None:
         assert lines_of(answer.parts)[0].endswith(f"({low:+.3f} to {high:+.3f}): {word}")
         assert answer.facts["standing"] == word
         assert next_step in str(in_chapters(trial_sections(control_test=one), one)[0]["next"])
-
-
-def test_intervals_of_modes_alone_are_exact() -> None:
-    for share, worlds in ((0.0, 20), (0.45, 20), (1.0, 7)):
-        expected = proportion_interval(share * worlds, worlds, confidence=0.9)
-        np.testing.assert_allclose(exact_interval(share, worlds, 0.9), expected, atol=1e-9)
 
 
 def test_a_policy_is_that_of_its_modes_again() -> None:
@@ -154,32 +147,6 @@ def test_missed_looks_hold_the_mode() -> None:
         share = 0.5 ** (period + 1)
         seen = (found["mode"][:, period] == 0).mean()
         assert abs(seen - share) < 4.0 * np.sqrt(share * (1.0 - share) / 200)
-
-
-def test_a_stopped_plan_goes_on_to_the_same_policy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    class Stopped(Exception):
-        """Represents a kill."""
-
-    written: list[str] = []
-    write = ShardStore.write
-
-    def some(store: ShardStore, *words: object) -> None:
-        if len(written) == 3:
-            raise Stopped
-        written.append("")
-        write(store, *words)  # type: ignore[arg-type]
-
-    work = ControlPlanWork(modes(), Wanted("L3", 20.0, 5.0), rounds=4, worlds=20, seed=1)
-    whole = run_work(work, tmp_path / "whole")
-    with monkeypatch.context() as patch:
-        patch.setattr(ShardStore, "write", some)
-        with pytest.raises(Exception):  # noqa: B017, PT011
-            run_work(work, tmp_path / "stopped")
-    again = run_work(work, tmp_path / "stopped")
-    assert again["action"].equals(whole["action"])
-    assert again.attrs["reached"] == whole.attrs["reached"]
 
 
 def test_draws_from_a_fit_are_those_of_its_uncertainty() -> None:

@@ -12,7 +12,6 @@ import xarray as xr
 from command_line import FLOW, here
 
 import driftwalk as dw
-from driftwalk.core.files.rundir import RunDirectory
 
 pytestmark = pytest.mark.slow
 
@@ -42,26 +41,6 @@ def test_a_run_holds_its_answer_and_its_figures(tmp_path: Path) -> None:
     assert again["weight"].equals(found["weight"])
     assert repr(again).startswith("20 runs of 2 blocks")
     assert here("report", out, "-o", tmp_path / "page.html").code == 0
-
-
-def test_a_killed_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    out = tmp_path / "out"
-    words = ("infer-outcomes", table(tmp_path), "--flow", FLOW, *QUICK, "--after", "4s", "-o")
-    store = RunDirectory.store
-
-    def killed(self: RunDirectory, name: str, **how: object) -> object:
-        if name == "check":
-            raise KeyboardInterrupt
-        return store(self, name, **how)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(RunDirectory, "store", killed)
-        assert here(*words, out).code != 0
-    assert not (out / "posterior.nc").exists()
-    assert here(*words, out).code == 0
-    assert here(*words, tmp_path / "other").code == 0
-    both = [xr.load_dataset(place / "posterior.nc") for place in (out, tmp_path / "other")]
-    assert both[0]["weight"].equals(both[1]["weight"])
 
 
 def test_all_join_in_the_centre_so_the_force_is_not_determined(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from chain_runs import chain_runs
@@ -43,6 +44,14 @@ def test_a_run_holds_its_answer_and_its_figures(tmp_path: Path) -> None:
     named = [[one["class"] for one in made[id]["classes"]] for id in ("shares", "seen-1")]
     assert named == [found["class"].values.tolist()] * 2
     assert made["seen-1"]["title"] == "Shares seen"
+    # Every arrow begins at a class and ends at another, with its rate per 1000 s.
+    places = {(one["x"], one["y"]) for one in made["graph"]["classes"]}
+    ends = [list(zip(one["x"], one["y"], strict=True)) for one in made["graph"]["arrows"]]
+    assert len(ends) == found.sizes["transition"]
+    assert {place for pair in ends for place in pair} == places
+    rates = 1e3 * found["rate"].values[0]
+    labels = np.array([float(one["label"]) for one in made["graph"]["arrows"]])
+    assert np.sort(labels) == pytest.approx(np.sort(rates), rel=0.06)
 
 
 def test_a_class_has_one_colour_in_all_figures_of_a_run() -> None:

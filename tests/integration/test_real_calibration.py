@@ -123,10 +123,11 @@ def test_calibrate_a_termite(
     assert found["force_std_N"] > 0.2 * study.calibration.force_std_max_N
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_calibrate_a_smarticle(
     shared_data: SharedData, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """A termite in every run."""
     folder, file = RECORDINGS["smarticles"]
     study = reduced(load_study(STUDIES / "smarticles.toml"), cells=5)
     recording = shared_data(folder) / file

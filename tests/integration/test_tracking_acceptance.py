@@ -153,11 +153,12 @@ def test_four_blocks_with_moderate_noise(
     assert 0.5 < found["z_total"] < 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("seed", [302])
 def test_four_blocks_with_heavy_noise(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path, seed: int
 ) -> None:
+    """With moderate noise in every run."""
     out, _, truth = filmed(scenes, tmp_path, "heavy", seed, 40)
     found = scores.score(xr.load_dataset(out), truth)
     assert found["recall_visible"] >= 0.95

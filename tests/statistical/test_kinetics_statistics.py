@@ -23,7 +23,7 @@ CHAINS = 400
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("runs", [40, 400])
+@pytest.mark.parametrize("runs", [40, pytest.param(400, marks=pytest.mark.study)])
 def test_a_well_mixed_tank_is_refused_in_five_percent_at_most(runs: int) -> None:
     """More than the 99.9 % quantile of 5 % would be no chance."""
     words = [judge_mixing(histories([chain_runs(runs, seed)])).word for seed in range(CHAINS)]
@@ -44,7 +44,7 @@ def test_a_tank_that_is_not_is_refused(shape: float, memory: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("memory", [1.0, 0.1])
+@pytest.mark.parametrize("memory", [1.0, pytest.param(0.1, marks=pytest.mark.study)])
 def test_equal_rates_are_refused_in_five_percent_at_most(memory: float) -> None:
     """Of 300 simulated runs and 30 others of half the length, with memory or without."""
     refused, sets = 0, 100
@@ -60,15 +60,13 @@ def test_equal_rates_are_refused_in_five_percent_at_most(memory: float) -> None:
     assert refused <= binom.ppf(0.999, sets, 0.05), refused
 
 
-@pytest.mark.parametrize(
-    ("form", "memory"),
-    [
-        pytest.param(FORMS[0], 1.0, marks=pytest.mark.slow),
-        pytest.param(FORMS[2], 0.2, marks=pytest.mark.study),
-    ],
-)
+@pytest.mark.study
+@pytest.mark.parametrize(("form", "memory"), [(FORMS[0], 1.0), (FORMS[2], 0.2)])
 def test_bands_hold_the_truth_as_often_as_they_say(form: Form, memory: float) -> None:
-    """Shares after 60 and 150 s and the committor, of 200 runs; 90 % within binomial chance."""
+    """Shares after 60 and 150 s and the committor, of 200 runs; 90 % within binomial chance.
+
+    In every run: the bands of a command (tests/integration/test_kinetics_command.py).
+    """
     truth = histories([chain_runs(30_000, 9, memory=memory)], classes=CLASSES)
     times, sets, at = np.array([60.0, 150.0]), 30, CLASSES.index("1+1+1+1")
     chosen = [CLASSES.index("T"), CLASSES.index("2+1+1")]

@@ -252,6 +252,13 @@ const biplot = object({
   arrows: list(object({ name: text, x: number, y: number, cells: withDefault(squares, []) })),
 });
 
+const classGraph = object({
+  ...base,
+  height: number,
+  classes: list(object({ class: text, cells: squares, x: number, y: number })),
+  arrows: list(object({ x: pair, y: pair, at: number, share: number, label: text })),
+});
+
 const replay = object({
   ...base,
   arena: nullable(arena),
@@ -331,6 +338,7 @@ export type OverTime = Checked<typeof overTime>;
 export type L1MapSection = Checked<typeof l1Map>;
 export type SettingTimesSection = Checked<typeof settingTimes>;
 export type BiplotSection = Checked<typeof biplot>;
+export type ClassGraphSection = Checked<typeof classGraph>;
 export type ReplaySection = Checked<typeof replay>;
 export type TableSection = Checked<typeof table>;
 export type ManifestSection = Checked<typeof manifest>;
@@ -351,6 +359,7 @@ export const SECTIONS = {
   l1_map: l1Map,
   setting_times: settingTimes,
   biplot,
+  class_graph: classGraph,
   replay,
   table,
   manifest,

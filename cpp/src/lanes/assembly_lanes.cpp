@@ -1,5 +1,4 @@
 // The self-assembly kernel, compiled once per instruction set.
-#include "driftwalk/assembly/kept_world.hpp"
 #include "driftwalk/assembly/run.hpp"
 #include "driftwalk/physics/laws/mixed.hpp"
 
@@ -21,8 +20,7 @@ std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
                                 : assembled.template operator()<QuadraticDrag>();
 }
 
-constexpr AssemblyKernel kernel{assemble, DRIFTWALK_PER_ISA(go_on_), assembly_lanes,
-                                PackMemory<Real>::bytes, KeptLayout<Real>::bytes};
+constexpr AssemblyKernel kernel{assemble, assembly_lanes, PackMemory<Real>::bytes};
 } // namespace
 
 DRIFTWALK_LANES_END

@@ -28,7 +28,6 @@ from driftwalk.assembly.outcomes.components import (
 from driftwalk.assembly.outcomes.distribution import (
     class_at,
     outcome_distribution,
-    proportion_interval,
     sampling_variance,
 )
 from driftwalk.assembly.outcomes.event_rates import rate_interval
@@ -62,6 +61,7 @@ from driftwalk.assembly.sensitivity.sobol import (
 )
 from driftwalk.assembly.tank_batch import TankBatch
 from driftwalk.assembly.yields.run import check_yield, maximise_yield
+from driftwalk.core.intervals import proportion_interval
 
 __all__ = [
     "Alignment",

@@ -68,8 +68,8 @@ class TankBatch:
 
     Each world is a `LiveTank` of its own: with ``backend="reference"`` it has the same bits as one
     that gets the same changes at the same times, with the default those of `assembly_path`, in
-    single precision and some twenty times faster. Neither the threads nor the other worlds change
-    its numbers.
+    single precision and three times faster. Neither the threads nor the other worlds change its
+    numbers.
 
     Parameters
     ----------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -249,7 +250,23 @@ def _client(address: ClusterAddress, stack: ExitStack) -> Any:
     else:
         begun = begin_jobs(address)
     stack.enter_context(begun)
+    if address.kind == "local":
+        _replace_lost(begun, address.workers, stack)
     return distributed.Client(begun, set_as_default=False)
+
+
+def _replace_lost(begun: Any, workers: int, stack: ExitStack) -> None:
+    """Replace workers that Dask gave up: those that take over 15 s to come back."""
+    ended = threading.Event()
+
+    def look() -> None:
+        # The loop of a cluster that is being closed takes no more calls.
+        with suppress(RuntimeError):
+            while not ended.wait(1.0) and begun.status.name == "running":
+                begun.scale(workers)
+
+    threading.Thread(target=look, daemon=True).start()
+    stack.callback(ended.set)
 
 
 def _await_workers(client: Any, address: ClusterAddress, say: Say) -> None:

@@ -81,7 +81,6 @@ def pairs_figure(calibration: xr.Dataset) -> Figure:
             ax.set_ylabel(_label(calibration, row))
         elif column:
             ax.tick_params(labelleft=False)
-        ax.tick_params(labelsize="x-small")
         ax.xaxis.set_major_locator(MaxNLocator(2))
     axes[0].set_yticks([])
     counts = calibration.attrs["estimate_from"] == "summaries"
@@ -160,7 +159,7 @@ def _plot_answer(one: xr.Dataset, ax: Axes) -> None:
             ax.axvline(float(end), color=style.BLUE, lw=0.8, ls="--")
     ax.axvline(float(one["estimate"]), color=style.ORANGE, lw=1.2)
     if not bool(one["determined"]):
-        ax.set_title("not determined", loc="left", fontsize="x-small", color=style.INK)
+        ax.set_title(f"not determined\n(± {100.0 * float(one['half_width']):.0f} %)", loc="left")
 
 
 def _plot_pair(calibration: xr.Dataset, column: int, row: int, ax: Axes) -> None:

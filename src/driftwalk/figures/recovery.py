@@ -168,7 +168,7 @@ def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
         # Without a point a logarithmic axis has no range.
         _logarithmic(ax)
     ax.set(xlabel="length of a recording (min)", ylabel="error of $C_d$, rms (%)")
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=6.0)
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return ax
 
 

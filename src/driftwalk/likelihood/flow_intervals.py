@@ -237,6 +237,8 @@ class FlowSetting(NamedTuple):
     """With the σ_F of the flow, and everything else that the fit found."""
     flow: xr.Dataset
     """A `flow_field`."""
+    uncertainty: xr.Dataset
+    """The fit with the σ_F of the flow, to draw parameters from."""
 
 
 def flow_settings(fit: xr.Dataset) -> dict[str, FlowSetting]:
@@ -250,7 +252,7 @@ def flow_settings(fit: xr.Dataset) -> dict[str, FlowSetting]:
     Returns
     -------
     dict of str to FlowSetting
-        Study and flow of each; of a fit without switching times the one is called "A".
+        Study, flow and uncertainty of each; without switching times the one is called "A".
 
     Raises
     ------
@@ -272,8 +274,22 @@ def flow_settings(fit: xr.Dataset) -> dict[str, FlowSetting]:
                 raise InputError(f"the fit does not determine σ_F in flow {label}")
             own = {"forces.force_std_N": float(fit["flow_force_std"][flow])}
         field = fitted_flow(fit, interval=intervals.of_flow(flow)[0])
-        found[label] = FlowSetting(estimated_study(fit, own), field)
+        found[label] = FlowSetting(estimated_study(fit, own), field, _of_flow(fit, flow))
     return found
+
+
+def _of_flow(fit: xr.Dataset, flow: int) -> xr.Dataset:
+    """Return a fit whose σ_F, and what is known of it, are those of one of its flows."""
+    if "flow_force_std" not in fit:
+        return fit
+    low, high = (np.log(fit[f"flow_force_std_{end}"].values) for end in ("low", "high"))
+    part = (high[flow] - low[flow]) / (high[0] - low[0])
+    scale = np.where(fit["log_parameter"] == "ln_noise_intensity", part, 1.0)
+    named = fit["parameter"] == "force_std"
+    return fit.assign(
+        estimate=fit["estimate"].where(~named, fit["flow_force_std"][flow]),
+        covariance=fit["covariance"] * np.outer(scale, scale),
+    )
 
 
 def _field_variables(fit: xr.Dataset) -> dict[str, Any]:

@@ -150,8 +150,8 @@ def _parameter_score(fit: xr.Dataset, name: str, truth: float, interval: int) ->
         value, low, high = (
             float(fit[f"flow_force_std{end}"][flow]) for end in ("", "_low", "_high")
         )
-    reach = 2.0 * float(ndtri(0.5 + 0.5 * facts["confidence"]))
-    sd = math.log(high / low) / reach
+    # The lower end of C_d holds the error of the strips besides.
+    sd = math.log(high / value) / float(ndtri(0.5 + 0.5 * facts["confidence"]))
     return {
         name: value,
         f"{name}_true": truth,

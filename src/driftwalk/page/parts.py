@@ -221,9 +221,10 @@ def summary_section(
 def table_section(
     id: str, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]], note: str = ""
 ) -> Section:
-    """Return a table; cells that a row lacks at its end stay empty."""
+    """Return a table; cells that a row lacks at its end stay empty, units are as in figures."""
     filled = [[*row, *[""] * (len(columns) - len(row))] for row in rows]
-    return section(id, "table", title, note or None, columns=list(columns), rows=filled)
+    heads = [one.replace("[", "(").replace("]", ")") for one in columns]
+    return section(id, "table", title, note or None, columns=heads, rows=filled)
 
 
 def section_of_table(id: str, title: str, table: Table, note: str = "") -> Section:

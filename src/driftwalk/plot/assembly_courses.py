@@ -102,7 +102,6 @@ def plot_class_times(
         ax.set_ylim(0.0, 1.0)
         # Rounding in the file: the top of the last area is the top of the axes.
         height = np.cumsum(proportion[:, -1]) - proportion[:, -1] / 2.0
-        labelled = proportion[:, -1] > 0.0
     else:
         for name, line in zip(names, proportion, strict=True):
             ax.plot(
@@ -110,8 +109,8 @@ def plot_class_times(
             )
         ax.set_ylim(0.0, min(1.0, 1.08 * float(np.nanmax(proportion))) or 1.0)
         height = proportion[:, -1]
-        labelled = proportion.max(axis=1) > 0.0
-    kept = np.flatnonzero(labelled)
+    # Those too that are empty at the end: their areas have no other name.
+    kept = np.flatnonzero(proportion.max(axis=1) > 0.0)
     _label_right(ax, [names[index] for index in kept], height[kept], colors)
     ax.set(xlabel=TIME_LABEL, ylabel="proportion of runs")
     ax.spines[["top", "right"]].set_visible(False)
@@ -158,7 +157,7 @@ def plot_attraction(attraction: xr.Dataset, ax: Axes | None = None) -> Axes:
     )  # fmt: skip
     ax.spines[["top", "right"]].set_visible(False)
     ax.legend(frameon=False)
-    ax.set_title(fill(str(attraction.attrs["between"]), 42), loc="left", size="small")
+    ax.set_title(fill(str(attraction.attrs["between"]), 42), loc="left")
     return ax
 
 

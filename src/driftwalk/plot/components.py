@@ -94,7 +94,7 @@ def plot_biplot(
     ax.set_xlabel(f"component 1 ({shares[0]:.3g} % of the variance)")
     ax.set_ylabel(f"component 2 ({shares[1]:.3g} % of the variance)")
     title = f"dots: settings; arrows: loadings × {found.factor:.2g}"
-    ax.set_title(title, loc="left", size=style.STYLE["axes.titlesize"])
+    ax.set_title(title, loc="left", size=style.FONT_PT)
     _set_limits(ax, np.vstack([points, found.tips, np.zeros((1, 2))]))
     _draw_arrows(ax, found.tips, found.names, points)
     return ax

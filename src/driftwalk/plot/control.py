@@ -62,7 +62,7 @@ def plot_policy(policy: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_title(f"with {policy['phase'].values[-1]:g} s left or more", loc="left")
     labels = policy["mode"].values
     keys = [Patch(color=_color(mode), label=str(labels[mode])) for mode in used.tolist()]
-    ax.legend(handles=keys, fontsize=6.0, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    ax.legend(handles=keys, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
 
 
@@ -146,12 +146,14 @@ def plot_control_run(test: xr.Dataset, ax: Axes | None = None) -> Axes:
     )
     ax.set_xlabel(TIME_LABEL)
     ax.set_xlim(time[0], time[-1])
-    ax.legend(fontsize=6.0, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
 
 
 def _color(mode: int) -> tuple[float, float, float, float]:
     """Return the colour of a mode by its number, the same in all figures of a policy."""
-    from matplotlib import colormaps
+    from matplotlib.colors import to_rgba
 
-    return colormaps["tab20"](mode % 20)
+    # After all hues the same ones paler.
+    paler, hue = divmod(mode, len(style.PALETTE))
+    return to_rgba(style.PALETTE[hue], 1.0 / (1.0 + paler))

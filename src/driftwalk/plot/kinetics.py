@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,10 @@ CLASS_PT = 28.0
 """Diameter of the circle about the sketch of a class [pt]; chosen by eye."""
 APART_PT = 3.5
 """Half of the distance between an arrow there and the one back [pt]; chosen by eye."""
+GRAPH_TITLE: Final = "rates (per 1000 s); width: share of what leaves the class"
+GROUND: Final[dict[str, Any]] = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"}
+WORDS_ZORDER: Final = 5.0
+"""Above all arrows, on a white ground: none crosses a word."""
 
 
 def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
@@ -56,6 +60,59 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     ``plot_class_graph(found)``
     """
+    place, rows, kept = class_graph_of(kinetics)
+    ax = _axes_for(len(place), rows) if ax is None else ax
+    ax.set_xlim(-0.12, 1.12)
+    ax.set_ylim(-0.12, 1.1)
+    ax.set_axis_off()
+    ax.set_title(GRAPH_TITLE, loc="left")
+    style.settle_layout(ax)
+    unit = style.axes_points(ax) / np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
+    discs = are_discs(*place)
+    for arrow in placed_arrows(place, kept, unit):
+        ax.annotate(
+            "", xy=tuple(arrow.last), xytext=tuple(arrow.first),
+            arrowprops={
+                "arrowstyle": "-|>", "lw": 0.4 + 2.6 * arrow.share, "color": style.MUTED,
+                "shrinkA": CLASS_PT / 2.0 + 2.0, "shrinkB": CLASS_PT / 2.0 + 2.0,
+            },
+        )  # fmt: skip
+        x, y = arrow.first + arrow.at * (arrow.last - arrow.first)
+        ax.text(x, y, arrow.label, ha="center", va="center", zorder=WORDS_ZORDER, bbox=GROUND)
+    colors = class_colors(class_names(kinetics))
+    for name, at in place.items():
+        ax.plot(*at, "o", ms=CLASS_PT, color="white", mec=colors[name], mew=0.8)
+        side = 20.0 / float(sketch_size(class_cells(name)).max())
+        place_sketch(ax, name, at, cell_pt=min(side, 6.0), color=colors[name], discs=discs)
+        ax.annotate(
+            short_class(name), at, xytext=(0, -17), textcoords="offset points", ha="center",
+            va="top", zorder=WORDS_ZORDER, bbox=GROUND,
+        )  # fmt: skip
+    return ax
+
+
+class Arrow(NamedTuple):
+    """A transition of the graph of classes, drawn by matplotlib and by a page."""
+
+    first: Floats
+    """Its two ends, shape (2,), from 0 to 1 across and up."""
+    last: Floats
+    at: float
+    """Place of its label along it, from 0 to 1."""
+    share: float
+    """Of the transitions that leave its class."""
+    label: str
+    """Its rate per 1000 s."""
+
+
+Transition = tuple[str, str, float, float]
+"""Two classes, the rate [1/s], and the share of what leaves the first."""
+
+
+def class_graph_of(
+    kinetics: xr.Dataset,
+) -> tuple[dict[str, tuple[float, float]], int, list[Transition]]:
+    """Return places of the classes, how many stand in a column, and the transitions."""
     check_kind(kinetics, "kinetics", "rate", "count", "share")
     rates, counts = (kinetics[name].isel(source=0).values for name in ("rate", "count"))
     pairs = [str(name).split(" -> ") for name in kinetics["transition"].values]
@@ -63,51 +120,30 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     for (start, _), count in zip(pairs, counts, strict=True):
         leaving[start] = leaving.get(start, 0) + int(count)
     kept = [
-        (start, end, rate, count / leaving[start])
+        (start, end, float(rate), float(count / leaving[start]))
         for (start, end), rate, count in zip(pairs, rates, counts, strict=True)
         if count > SHOWN_SHARE * leaving[start]
     ]
-    place, rows = _places(list(dict.fromkeys(name for one in kept for name in one[:2])))
-    ax = _axes_for(len(place), rows) if ax is None else ax
-    ax.set_xlim(-0.12, 1.12)
-    ax.set_ylim(-0.12, 1.1)
-    ax.set_axis_off()
-    ax.set_title("rates (per 1000 s); width: share of what leaves the class", loc="left")
-    style.settle_layout(ax)
-    unit = style.axes_points(ax) / np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
-    discs = are_discs(*place)
+    return *_places(list(dict.fromkeys(name for one in kept for name in one[:2]))), kept
+
+
+def placed_arrows(
+    place: dict[str, tuple[float, float]], kept: list[Transition], unit: Floats
+) -> list[Arrow]:
+    """Return the arrows, the widest first; `unit` is the size of the graph, shape (2,) [pt]."""
     shown = {one[:2] for one in kept}
-    taken: list[Floats] = []
+    taken = [np.array(one) for one in place.values()]
+    made = []
     for start, end, rate, share in sorted(kept, key=lambda one: -one[3]):
         first, last = np.array(place[start]), np.array(place[end])
         if (end, start) in shown:  # there and back run next to each other
             along = unit * (last - first)
             aside = APART_PT * np.array([-along[1], along[0]]) / np.hypot(*along) / unit
             first, last = first + aside, last + aside
-        ax.annotate(
-            "", xy=tuple(last), xytext=tuple(first),
-            arrowprops={
-                "arrowstyle": "-|>", "lw": 0.4 + 2.6 * share, "color": style.MUTED,
-                "shrinkA": CLASS_PT / 2.0 + 2.0, "shrinkB": CLASS_PT / 2.0 + 2.0,
-            },
-        )  # fmt: skip
-        free = _free_place(first, last, [*taken, *map(np.array, place.values())], unit)
-        taken.append(free)
-        ax.text(
-            float(free[0]), float(free[1]), _rate_text(1e3 * rate), fontsize=6.0, ha="center",
-            va="center",
-            bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
-        )  # fmt: skip
-    colors = class_colors(class_names(kinetics))
-    for name, at in place.items():
-        ax.plot(*at, "o", ms=CLASS_PT, color="white", mec=colors[name], mew=0.8)
-        side = 20.0 / float(sketch_size(class_cells(name)).max())
-        place_sketch(ax, name, at, cell_pt=min(side, 6.0), color=colors[name], discs=discs)
-        ax.annotate(
-            short_class(name), at, xytext=(0, -15), textcoords="offset points", ha="center",
-            va="top", fontsize=6.5,
-        )  # fmt: skip
-    return ax
+        at = _free_place(first, last, taken, unit)
+        taken.append(first + at * (last - first))
+        made.append(Arrow(first, last, at, share, _rate_text(1e3 * rate)))
+    return made
 
 
 def _rate_text(rate: float) -> str:
@@ -123,12 +159,12 @@ def _axes_for(classes: int, rows: int) -> Axes:
     return figure.add_subplot()
 
 
-def _free_place(first: Floats, last: Floats, taken: list[Floats], unit: Floats) -> Floats:
-    """Return the place along an arrow that is farthest from all labels and classes so far."""
-    places = first + np.linspace(0.25, 0.7, 19)[:, None] * (last - first)
+def _free_place(first: Floats, last: Floats, taken: list[Floats], unit: Floats) -> float:
+    """Return the share of an arrow that is farthest from all labels and classes so far."""
+    shares = np.linspace(0.25, 0.7, 19)
+    places = first + shares[:, None] * (last - first)
     off = [min(np.hypot(*(unit * (place - other))) for other in taken) for place in places]
-    found: Floats = places[int(np.argmax(off))]
-    return found
+    return float(shares[int(np.argmax(off))])
 
 
 def _places(names: list[str]) -> tuple[dict[str, tuple[float, float]], int]:
@@ -183,7 +219,7 @@ def plot_predicted_shares(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
             seen = one["empirical"].values[source]
             ax.plot(time[::6], seen[::6], marker, color=color, ms=2.5, mew=0.7)
     ax.set(xlabel=TIME_LABEL, ylabel="share of runs", xlim=(time[0], time[-1]), ylim=(0.0, None))
-    ax.legend(ncols=2, fontsize=6.0)
+    ax.legend(ncols=2)
     ax.spines[["top", "right"]].set_visible(False)
     ax.set_title("predicted (lines), seen (points)", loc="left")
     return ax

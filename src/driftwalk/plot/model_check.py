@@ -168,14 +168,12 @@ def plot_residual_time(
         # A strip below the error bars, for the words.
         low, high = ax.get_ylim()
         ax.set_ylim(low - 0.12 * (high - low), high)
-        ax.text(
-            0.98, 0.03, words, ha="right", color=style.MUTED, fontsize=6.0, transform=ax.transAxes
-        )
+        ax.text(0.98, 0.03, words, ha="right", color=style.MUTED, transform=ax.transAxes)
     for edge in start[1:][np.diff(check["part_recording"].values) > 0] / 60.0:
         ax.axvline(edge, color=style.MUTED, lw=0.6, ls=":")
     ax.set_xlabel("time (min)")
     ax.set_ylabel(
-        "strength of the flow,\noff its mean (%)" if show == "flow" else "squared errors, off (%)"
+        "strength of the flow, off its mean (%)" if show == "flow" else "squared errors, off (%)"
     )
     return ax
 
@@ -269,9 +267,11 @@ def _draw_means(ax: Axes, check: xr.Dataset) -> None:
         ax.add_patch(
             Rectangle(corner, size, size, fill=False, edgecolor=style.ORANGE, lw=1.4, zorder=5)
         )
-    # The limit is that of the largest of all cells.
-    framed = f"framed: above {limit:.1f}, by chance\nin one recording of twenty"
-    style.add_colorbar(mesh, ax, f"distance from zero (sd)\n{framed}")
+    style.add_colorbar(mesh, ax, "distance from zero (sd)")
+    if (distance[known] > limit).any():
+        # The limit is that of the largest of all cells.
+        words = f"framed: above {limit:.1f}, by chance in one recording of twenty"
+        style.add_footer(style.figure_of(ax), words)
 
 
 def _draw_noise(ax: Axes, check: xr.Dataset) -> None:
@@ -287,7 +287,7 @@ def _draw_noise(ax: Axes, check: xr.Dataset) -> None:
         x, y, off, cmap="PuOr_r", norm=CenteredNorm(0.0, halfrange=top), shading="nearest"
     )
     mesh.set_rasterized(True)
-    style.add_colorbar(mesh, ax, "mean square of the errors,\nagainst that of all (sd)")
+    style.add_colorbar(mesh, ax, "square of the errors, off that of all (sd)")
 
 
 def running_time(check: xr.Dataset) -> tuple[Floats, Floats]:

@@ -209,6 +209,6 @@ def _legend(ax: Axes, both: list[xr.Dataset]) -> None:
     texts.append(f"{percent(confidence)} {name}" if confidence is not None else name)
     ax.legend(
         handles, texts, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
-        fontsize=style.STYLE["legend.fontsize"], frameon=False,
+        fontsize=style.FONT_PT, frameon=False,
         ncols=2 if len(handles) > 2 and style.axes_points(ax)[0] > 380.0 else 1,
     )  # fmt: skip

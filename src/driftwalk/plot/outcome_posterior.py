@@ -138,7 +138,7 @@ def plot_data_widths(posterior: xr.Dataset, ax: Axes | None = None) -> Axes:
         ax.barh(rows, width, height=0.8 / size, label=_words(number_of(one)))
     for row, there in enumerate(offered):
         if not there:
-            ax.text(0.01, row, "not offered: regions do not cover", va="center", fontsize=6.5)
+            ax.text(0.01, row, "not offered: regions do not cover", va="center")
     ax.axvline(1.0, color=style.MUTED, lw=0.7)
     ax.set_yticks(place, kinds)
     ax.invert_yaxis()
@@ -147,5 +147,5 @@ def plot_data_widths(posterior: xr.Dataset, ax: Axes | None = None) -> Axes:
         xlim=(0.0, 1.1),
     )
     ax.spines[["top", "right"]].set_visible(False)
-    ax.legend(fontsize=6.5, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=size)
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=size)
     return ax

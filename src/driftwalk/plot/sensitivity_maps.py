@@ -12,7 +12,6 @@ from driftwalk.core.errors import InputError
 from driftwalk.plot.distances import cell_edges, hatch_cell
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import (
-    PALETTE,
     SweepAxis,
     check_kind,
     class_names,
@@ -330,13 +329,13 @@ def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Floats, *, color: str)
     else:
         other = others[0]
         texts = other.words or [f"{value:.4g}" for value in other.values]
-        name = other.label.split(",\n")[0]
+        name = other.label.split(", ")[0]
         spread = 0.12 * (np.arange(len(texts)) - (len(texts) - 1) / 2.0)
         for index, text in enumerate(texts):
             ax.plot(
                 along.values + (spread[index] if along.words else 0.0), values[:, index],
                 marker=MARKERS[index % len(MARKERS)], ms=3.5, ls=line,
-                color=PALETTE[index % len(PALETTE)], label=f"{name}: {text}",
+                color=style.PALETTE[index % len(style.PALETTE)], label=f"{name}: {text}",
             )  # fmt: skip
     if along.words:
         ax.set_xticks(along.values, labels=along.words)
@@ -353,14 +352,15 @@ def _mark_on_line(ax: Axes, sensitivity: xr.Dataset, sweep: list[SweepAxis]) -> 
 
 
 def _label_outside(panels: list[Axes], columns: int) -> None:
-    """Keep the labels of the leftmost and of the lowest panel of every column only."""
+    """Label the lowest panel of every column, and all rows at once."""
+    style.figure_of(panels[0]).supylabel(panels[0].get_ylabel())
     for index, ax in enumerate(panels):
         lowest = index + columns >= len(panels)
         ax.tick_params(labelbottom=lowest)
         if not lowest:
             ax.set_xlabel("")
-        if index % columns:
-            ax.set_ylabel("")
+        # One label for all rows: a panel is lower than it is long.
+        ax.set_ylabel("")
 
 
 def _title_panel(ax: Axes, name: str, *, discs: bool) -> None:
@@ -388,5 +388,5 @@ def _legend_above(ax: Axes) -> None:
         ax.legend(
             handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0),
             ncols=2 if narrow else 1, borderaxespad=0.2,
-            fontsize=style.STYLE["legend.fontsize"], frameon=False,
+            fontsize=style.FONT_PT, frameon=False,
         )  # fmt: skip

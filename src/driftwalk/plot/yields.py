@@ -64,7 +64,7 @@ def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
         xlabel=TIME_LABEL, ylabel=f"share of runs with {target}", xlim=(time[0], time[-1]),
         ylim=(0.0, None),
     )  # fmt: skip
-    ax.legend(fontsize=6.0)
+    ax.legend()
     ax.spines[["top", "right"]].set_visible(False)
     return ax
 
@@ -107,7 +107,7 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
             [float(one["difference"] - one["difference_low"])],
         ]
         word = str(one["standing"].values)
-        color = style.MUTED if word == "worse" else "C0"
+        color = style.MUTED if word == "worse" else style.BLUE
         ax.errorbar(
             -behind[at], row, xerr=reach, fmt=MARKERS[word], color=color, ms=3.0, lw=0.8,
             label=WORDS.get(word, word),
@@ -117,7 +117,7 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
         -within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"grey: within {100 * within:g} %"
     )
     words = [setting_words(found, int(at)) for at in order]
-    ax.set_yticks(range(len(order)), words, fontsize=6.0)
+    ax.set_yticks(range(len(order)), words)
     ax.invert_yaxis()
     ax.set_xlabel("yield less that of the best")
     ax.spines[["top", "right"]].set_visible(False)
@@ -125,7 +125,6 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     keys = dict(zip(texts, handles, strict=True))
     ax.legend(
         list(keys.values()), list(keys), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2,
-        fontsize=6.0,
     )  # fmt: skip
     engine = style.figure_of(ax).get_layout_engine()
     if isinstance(engine, ConstrainedLayoutEngine):

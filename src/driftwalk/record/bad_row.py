@@ -65,7 +65,8 @@ def _check_row(
     if len(fields) > expected and not any(fields[expected:]):
         fields = fields[:expected]
     if len(fields) != expected:
-        hint = _decimal_hint(text, layout.delimiter, got=len(fields))
+        commas = layout.delimiter == "," and len(fields) > 1 and "." not in text
+        hint = " (if decimals are written with a comma, save them with a point)" if commas else ""
         raise FormatError(
             f"expected {expected} fields separated by "
             f"{DELIMITER_NAMES.get(layout.delimiter, repr(layout.delimiter))}, "
@@ -76,7 +77,7 @@ def _check_row(
         value = fields[column]
         if value not in MISSING and not is_number(value, decimal=decimal):
             raise FormatError(
-                f"'{_short(value)}' in column '{layout.names[column]}' is not a number"
+                f"'{value:.40}' in column '{layout.names[column]}' is not a number"
                 f"{_other_sign(value, decimal)}",
                 line=line,
                 column=column + 1,
@@ -90,16 +91,6 @@ def _other_sign(value: str, decimal: str) -> str:
         return ""
     signs = {".": "a point", ",": "a comma"}
     return f": it has {signs[other]} as decimal sign, and other numbers have {signs[decimal]}"
-
-
-def _decimal_hint(text: str, delimiter: str, *, got: int) -> str:
-    if delimiter == "," and got > 1 and "." not in text:
-        return " (if decimals are written with a comma, save them with a point)"
-    return ""
-
-
-def _short(value: str) -> str:
-    return value if len(value) <= 40 else value[:37] + "..."
 
 
 def split_fields(text: str, delimiter: str) -> list[str]:

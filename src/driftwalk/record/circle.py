@@ -99,7 +99,9 @@ def fit_circle(x: npt.ArrayLike, y: npt.ArrayLike) -> CircleFit:
     if points.shape[0] < 20:
         raise InputError(f"a circle needs at least 20 positions, got {points.shape[0]}")
     total = points.shape[0]
-    points = _without_gross_errors(points)
+    # Those farther than twice the 99 % distance from the median point are gross errors.
+    apart = np.hypot(*(points - np.median(points, axis=0)).T)
+    points = points[apart <= 2.0 * np.percentile(apart, 99.0)]
     if np.ptp(points, axis=0).max() == 0.0:
         raise InputError("a circle cannot be fitted: the body never moves")
     angle = 2.0 * np.pi * np.arange(CIRCLE.directions) / CIRCLE.directions
@@ -148,13 +150,6 @@ def tank_radius_bound(centers_radius: float, block_side: float) -> float:
     """
     half = 0.5 * block_side
     return math.hypot(centers_radius + half, half)
-
-
-def _without_gross_errors(points: Array) -> Array:
-    """Drop samples farther than twice the 99 % distance from the median point."""
-    distance = np.hypot(*(points - np.median(points, axis=0)).T)
-    kept: Array = points[distance <= 2.0 * np.percentile(distance, 99.0)]
-    return kept
 
 
 def _extents(points: Array, directions: Array) -> Array:

@@ -10,6 +10,7 @@ from typing import Final
 
 from driftwalk.record.vocabulary import (
     ALLOWED,
+    DIRECTIONS,
     IMAGE_WORDS,
     INNER,
     NO_POSITION,
@@ -25,7 +26,7 @@ QUATERNION: Final = ("qx", "qy", "qz", "qw")
 OF_BODY: Final = ("x", "y", "z", "theta", *QUATERNION, "lon", "lat", "confidence")
 """Quantities that a table may have once for each body."""
 # Words before x, y, z or w that make them a part of a quaternion: "orientation.x", "q_w".
-_QUATERNION_WORDS = frozenset({"q", "quat", "quaternion", "orientation"})
+_QUATERNION_WORDS = words("q quat quaternion orientation rot rotation")
 _FRAME_WORDS = words("number no index stamp col num")
 # Of several columns of a quantity, one with such a word comes before one with any other.
 _FIRST = words(
@@ -76,7 +77,7 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     >>> column_meaning("robot2 theta (deg)").body
     'robot2'
     """
-    text, inside = _split_brackets(_plain(name))
+    text, inside = split_brackets(name)
     inside = inside or unit_below.strip("[]() ").lower()
     unit, unknown = UNITS.get(inside, ""), "" if inside in UNITS else inside
     tokens = _join_quaternion(words_of(_JOINED.sub(r"\1_\2", text)))
@@ -113,6 +114,8 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
         return None
     if quantity in OF_BODY and lower & NO_POSITION:
         return None
+    if quantity in ("x", "y", "z") and lower & DIRECTIONS:
+        return None
     if (unit and unit not in ALLOWED[quantity]) or (unknown and not ALLOWED[quantity]):
         return None
     image = lower & IMAGE_WORDS
@@ -126,10 +129,6 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
         rank=1 if root in _FIRST and not lower - _FRAME_WORDS - {"id"} else 2,
         ending=tokens[-1] if not unit and tokens[-1] in names else "",
     )
-
-
-def _plain(name: str) -> str:
-    return name.strip().strip("\"'").strip().lstrip("#%").strip()
 
 
 def _quantity(tokens: list[str]) -> tuple[int, str, str]:
@@ -201,13 +200,14 @@ def unit_of_name(name: str) -> str:
     >>> unit_of_name("Winkel [°]")
     'deg'
     """
-    text, unit = _split_brackets(name.strip().strip("\"'").strip())
+    text, unit = split_brackets(name)
     last = re.split(r"[\s_.\-/]+", text)[-1].lower()
     return UNITS.get(unit, "") if unit else (UNITS.get(last, "") if last != text.lower() else "")
 
 
-def _split_brackets(name: str) -> tuple[str, str]:
+def split_brackets(name: str) -> tuple[str, str]:
     """Split ``"x (mm)"`` into the name and what stands in the brackets, in small letters."""
+    name = name.strip().strip("\"'").strip().lstrip("#%").strip()
     match = _BRACKETS.match(name)
     return (name, "") if match is None else (match.group(1), match.group(2).strip().lower())
 

@@ -13,7 +13,7 @@ import numpy as np
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.circle import implied_scale
 from driftwalk.record.cleaning.clock import CLOCK
-from driftwalk.record.cleaning.warn import refuse_far
+from driftwalk.record.cleaning.warn import refuse_far, span_of
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     CLOCK_UNITS,
@@ -43,7 +43,10 @@ def detect_quantum(values: Array) -> float:
     >>> detect_quantum(np.arange(100) % 7 * 0.25)
     0.25
     """
-    known = _some_known(values)
+    present = np.isfinite(values)
+    count = int(present.sum())
+    every = count // 50_000 + 1 if count > 50_000 else 1  # of many every second, third, ... one
+    known = values[::every] if count == values.size else values[np.flatnonzero(present)[::every]]
     if known.size < 2:
         return 0.0
     decimal = _decimal_quantum(known)
@@ -51,26 +54,10 @@ def detect_quantum(values: Array) -> float:
     return coarse if coarse > 0.0 else decimal
 
 
-def _some_known(values: Array) -> Array:
-    """Return the finite values, of many every second, third, ... one."""
-    present = np.isfinite(values)
-    count = int(present.sum())
-    if count <= 50_000:
-        return values[present]
-    every = count // 50_000 + 1
-    return values[::every] if count == values.size else values[np.flatnonzero(present)[::every]]
-
-
 def common_quantum(series: Iterable[Array]) -> float:
     """Return the finest resolution among coordinates that vary, 0 when one has none."""
-    found = [detect_quantum(values) for values in series if _varies(values)]
+    found = [detect_quantum(values) for values in series if span_of([values]) > 0.0]
     return min(found, default=0.0)
-
-
-def _varies(values: Array) -> bool:
-    known = np.isfinite(values)
-    least = float(np.min(values, where=known, initial=np.inf))
-    return float(np.max(values, where=known, initial=-np.inf)) > least
 
 
 def _decimal_quantum(values: Array) -> float:
@@ -144,14 +131,17 @@ def convert_units(
     if y_axis not in (None, "up", "down"):
         raise InputError(f"`y_axis` is 'up' or 'down', got '{y_axis}'")
     scale_text = scale_wanted(raw.length_unit, raw.bare_length_is_si, options)
-    rate_text = _rate_wanted(raw, options)
+    rate_text = ""
+    if raw.clock_unit == "frame" and options.frame_rate_hz is None and raw.frame_rate_hz is None:
+        rate_text = "the file counts frames: give their rate in Hz with `frame_rate`"
     if scale_text or rate_text:
         implied = implied_scale(raw.bodies, tank) if scale_text else ""
         raise InputError("; ".join(text for text in (scale_text, rate_text, implied) if text))
     scale, in_pixels = _length_scale(raw, options)
     ticks, rate = _ticks(raw, options)
     refuse_far(raw.bodies, scale)
-    flip, flip_theta = _flips(raw, y_axis=y_axis, in_pixels=in_pixels)
+    positions = y_axis or raw.y_axis or ("down" if in_pixels else "up")
+    flip, flip_theta = positions == "down", (y_axis or raw.theta_axis or positions) == "down"
     quantum = common_quantum(values for body in raw.bodies[:4] for values in (body.x, body.y))
     attrs: dict[str, object] = dict(raw.attrs)
     negated = _describe_negated(raw, flip, flip_theta)
@@ -205,14 +195,6 @@ def _unit(length_unit: str, bare_is_si: bool, options: ReadOptions) -> str:
     return options.length_unit or length_unit or usual
 
 
-def _rate_wanted(raw: RawRecording, options: ReadOptions) -> str:
-    """Return what is to be given so that times are known, empty where nothing is."""
-    rates = (options.frame_rate_hz, raw.frame_rate_hz)
-    if raw.clock_unit != "frame" or any(rate is not None for rate in rates):
-        return ""
-    return "the file counts frames: give their rate in Hz with `frame_rate`"
-
-
 def _length_scale(raw: RawRecording, options: ReadOptions) -> tuple[float, bool]:
     """Return (metres per unit of the file, whether that unit is the pixel)."""
     unit = options.length_unit
@@ -252,21 +234,12 @@ def _positive(value: float | None, argument: str) -> float:
     return float(value)
 
 
-def _flips(raw: RawRecording, *, y_axis: str | None, in_pixels: bool) -> tuple[bool, bool]:
-    """Return whether y and whether theta change their sign."""
-    positions = y_axis or raw.y_axis or ("down" if in_pixels else "up")
-    angles = y_axis or raw.theta_axis or positions
-    return positions == "down", angles == "down"
-
-
 def _describe_negated(raw: RawRecording, flip: bool, flip_theta: bool) -> str:
     has_theta = any(body.theta is not None for body in raw.bodies)
     if not flip and not (flip_theta and has_theta):
         return "up in the file: kept"
     if not has_theta or flip == flip_theta:
-        return (
-            "down in the file: y and theta negated" if has_theta else "down in the file: y negated"
-        )
+        return f"down in the file: y {'and theta ' if has_theta else ''}negated"
     kept, negated = ("theta", "y") if flip else ("y", "theta")
     return f"{kept} kept, {negated} negated (measured in the image)"
 

@@ -96,7 +96,12 @@ def _describe_body(trajectory: xr.Dataset, name: str) -> dict[str, Any]:
         "samples": int(track.time.size),
         "has_orientation": track.has_orientation,
         **_clock(track),
-        **_extent(track),
+        **{
+            f"{axis}_{side}_m": float(getattr(np, side)(getattr(track, axis)))
+            for axis in ("x", "y")
+            for side in ("min", "max")
+            if track.time.size
+        },
         **_speed(track),
         **noise._asdict(),
     }
@@ -132,29 +137,14 @@ def _clock(track: Track) -> dict[str, Any]:
     }
 
 
-def _extent(track: Track) -> dict[str, Any]:
-    if not track.time.size:
-        return {}
-    return {
-        f"{axis}_{side}_m": float(getattr(np, side)(getattr(track, axis)))
-        for axis in ("x", "y")
-        for side in ("min", "max")
-    }
-
-
 def _circle(track: Track) -> dict[str, Any] | None:
     """Return the circle of the centres, None when there is none to fit."""
+    names = ("radius_m", "sectors_visited_share", "residual_m", "samples_astray")
     try:
-        fit = fit_circle(track.x, track.y)
+        x, y, *rest = fit_circle(track.x, track.y)
     except InputError:
         return None
-    return {
-        "center_m": [fit.center_x, fit.center_y],
-        "radius_m": fit.radius,
-        "sectors_visited_share": fit.coverage,
-        "residual_m": fit.residual,
-        "samples_astray": fit.astray,
-    }
+    return {"center_m": [x, y], **dict(zip(names, rest, strict=True))}
 
 
 def _speed(track: Track) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -170,7 +170,9 @@ def load(
     >>> load(str(recording), tank="circle:30cm", block="3cm").sizes["time"]
     18001
     """
-    block_side = None if block is None else _side(block)
+    block_side = None if block is None else parse_quantity(block, "m")
+    if block_side is not None and not (math.isfinite(block_side) and block_side > 0.0):
+        raise InputError(f"`block` is the side of a square block, above zero; got {block!r}")
     options = ReadOptions(
         columns={quantity: str(name) for quantity, name in (columns or {}).items()},
         delimiter=DELIMITERS.get(delimiter or "", delimiter),
@@ -215,9 +217,12 @@ def load(
             separate=raw.separate,
             columns=raw.body_columns,
         )
-        cleaned, counts = _clean(bodies, clean)
-        # The arrays before the cleaning are freed before the dataset is made.
-        del bodies
+        cleaned: list[RawBody] = []
+        counts: dict[str, Counts] = {}
+        while bodies:  # the uncleaned one is let go as soon as its successor is there
+            one, found = clean(bodies.pop(0))
+            cleaned.append(one)
+            counts[one.name] = found
         if not any(body.clock.size for body in cleaned):
             if start is not None or stop is not None:
                 raise InputError("no sample lies between `start` and `stop`")
@@ -258,27 +263,16 @@ def _refuse_uneven(raw: RawRecording) -> None:
 
 def _refuse_unused(options: ReadOptions, raw: RawRecording, format: str) -> None:
     """Refuse what says something about a file that this file has not."""
-    if options.up is not None and not raw.plane:
-        raise InputError("the positions have two axes: leave `up` out")
-    if options.topic is not None and format != "ros":
-        raise InputError("the file is no ROS bag: leave `topic` out")
-    if options.header_line is not None and format not in (PLAIN, "excel"):
-        raise InputError(f"`header_line` is for plain tables, and this is '{format}': leave it out")
-    if options.box is not None and not raw.columns:
-        raise InputError(f"`box` is for tables, and this is '{format}': leave it out")
-    if options.sheet is not None and format not in ("excel", "matlab", "arrays"):
-        raise InputError(
-            f"`sheet` is for workbooks, MATLAB files and arrays, and this is '{format}': leave it "
-            "out"
-        )
-
-
-def _side(block: float | str) -> float:
-    """Return the side of a block [m], from a number or a text with a unit."""
-    side = parse_quantity(block, "m")
-    if not (math.isfinite(side) and side > 0.0):
-        raise InputError(f"`block` is the side of a square block, above zero; got {block!r}")
-    return side
+    uses = (
+        ("up", "positions with three axes", bool(raw.plane)),
+        ("topic", "ROS bags", format == "ros"),
+        ("header_line", "plain tables", format in (PLAIN, "excel")),
+        ("box", "tables", bool(raw.columns)),
+        ("sheet", "workbooks, MATLAB files and arrays", format in ("excel", "matlab", "arrays")),
+    )
+    for name, what, known in uses:
+        if getattr(options, name) is not None and not known:
+            raise InputError(f"`{name}` is for {what}, and this is '{format}': leave it out")
 
 
 def _select(bodies: list[RawBody], wanted: str | None) -> list[RawBody]:
@@ -289,19 +283,6 @@ def _select(bodies: list[RawBody], wanted: str | None) -> list[RawBody]:
         names = listed([body.name for body in bodies])
         raise InputError(f"`body` '{wanted}': no such body in the recording; it has {names}")
     return chosen
-
-
-def _clean(
-    bodies: list[RawBody], clean: Callable[[RawBody], tuple[RawBody, Counts]]
-) -> tuple[list[RawBody], dict[str, Counts]]:
-    """Clean each body; the uncleaned one is let go as soon as its successor is there."""
-    cleaned: list[RawBody] = []
-    counts: dict[str, Counts] = {}
-    while bodies:
-        body, found = clean(bodies.pop(0))
-        cleaned.append(body)
-        counts[body.name] = found
-    return cleaned, counts
 
 
 def _assemble(
@@ -331,7 +312,10 @@ def _assemble(
     totals = {key: sum(getattr(one, key) for one in counts.values()) for key in vars(Counts())}
     time, x, y, theta = _one_clock(bodies)
     if "sample_rate_Hz" not in attrs and time.size > 1:
-        attrs["sample_rate_Hz"] = _usual_rate(bodies)
+        # The differences are the median's own to sort: a long recording is not to be held twice.
+        steps = (np.diff(body.clock) for body in bodies if body.clock.size > 1)
+        intervals = [float(np.median(step, overwrite_input=True)) for step in steps]
+        attrs["sample_rate_Hz"] = float(1.0 / np.median(intervals)) if intervals else 0.0
     if twice := totals["times_in_two_places"]:
         notes.append(f"times with rows in different places, of which the last is kept: {twice}")
     notes += [*plausibility_warnings(bodies), *jumps]
@@ -405,13 +389,6 @@ def _on_clock(time: Array, bodies: list[RawBody], values: Sequence[Array | None]
         if one is not None:
             columns[np.searchsorted(time, body.clock), index] = one
     return columns
-
-
-def _usual_rate(bodies: list[RawBody]) -> float:
-    # The differences are the median's own to sort: a long recording is not to be held once more.
-    steps = [np.diff(body.clock) for body in bodies if body.clock.size > 1]
-    intervals = [float(np.median(step, overwrite_input=True)) for step in steps]
-    return float(1.0 / np.median(intervals)) if intervals else 0.0
 
 
 CSV_COLUMNS = ["t_s", "x_m", "y_m", "theta_rad", "body"]

@@ -12,8 +12,7 @@ from typing import Any, Final
 from driftwalk.core.errors import FormatError, InputError, naming_its_file
 from driftwalk.core.files.bounded import text_of_name
 from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.recognise import nearest_table
-from driftwalk.record.registry import PLAIN, find_loader, loaders
+from driftwalk.record.registry import PLAIN, find_loader, loaders, nearest_table
 from driftwalk.record.tables.in_memory import MemorySource, table_in_memory
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import encoding_notes, read_head
@@ -78,8 +77,8 @@ def origin_of(
     InputError
         When it is nothing that can be read, or an option is about something else.
     """
-    table = table_in_memory(data)
-    if table is not None:
+    if not (isinstance(data, str) or hasattr(data, "__fspath__")):
+        table = table_in_memory(data)
         return _of_table(table, options, format=format, replicate=replicate)
     path = Path(data)
     if replicate is not None and kind_of_file(path) != "simulation":

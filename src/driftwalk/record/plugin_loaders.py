@@ -71,12 +71,8 @@ class ForeignLoader:
         try:
             raw = self._loader.read(path, options)
         except FormatError as error:
-            raise FormatError(
-                f"{' '.join(error.reason.split())} ({by})",
-                path=error.path,
-                line=error.line,
-                column=error.column,
-            ) from error
+            reason, at = f"{' '.join(error.reason.split())} ({by})", (error.line, error.column)
+            raise FormatError(reason, path=error.path, line=at[0], column=at[1]) from error
         except InputError as error:
             raise InputError(f"{reason_of(error)} ({by})") from error
         except Exception as error:  # whatever another package's code raises

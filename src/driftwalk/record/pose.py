@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -37,9 +37,6 @@ def angle_between(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array
     return angle
 
 
-Place = TypeVar("Place")
-"""Where a file holds a keypoint: its columns, or its indices."""
-
 Point = tuple[Array, Array, "Array | None"]
 """x, y and confidence of a keypoint, shape (n,) each; None: the file holds no confidence."""
 
@@ -66,19 +63,6 @@ class Confidence:
     """Below it a position is missing."""
     reason: str
     """Where that number comes from."""
-
-
-@dataclass
-class Poses(Generic[Place]):
-    """Keypoints of every individual, read one by one."""
-
-    individuals: Mapping[str, Mapping[str, Place]]
-    """Individual to keypoint to its place in the file."""
-    read: Callable[[Place], Point]
-    """Returns a keypoint as new arrays."""
-    dropped: int = field(default=0, init=False)
-    seen: int = field(default=0, init=False)
-    confident: bool = field(default=False, init=False)
 
 
 def choose_keypoints(names: Sequence[str], options: ReadOptions) -> Chosen:
@@ -112,7 +96,8 @@ def choose_keypoints(names: Sequence[str], options: ReadOptions) -> Chosen:
 
 
 def recording_of_poses(
-    poses: Poses[Place],
+    places: Mapping[str, Mapping[str, Any]],
+    read: Callable[[Any], Point],
     chosen: Chosen,
     clock: Array,
     options: ReadOptions,
@@ -123,8 +108,10 @@ def recording_of_poses(
 
     Parameters
     ----------
-    poses : Poses
-        The keypoints.
+    places : mapping
+        Individual to keypoint to its place in the file.
+    read : callable
+        Returns the keypoint at a place as new arrays.
     chosen : Chosen
         Which of them make the pose.
     clock : array, shape (n,)
@@ -139,61 +126,46 @@ def recording_of_poses(
     InputError
         When a least confidence is asked for and the file holds no confidences.
     """
+    stated = options.min_confidence is not None
     least = usual.least if options.min_confidence is None else options.min_confidence
-    bodies = []
-    for individual, places in poses.individuals.items():
-        if chosen.position not in places:
+    bodies, notes = [], []
+    dropped, known, confident = 0, 0, False
+    for individual, own in places.items():
+        if chosen.position not in own:
             continue
-        points = {
-            name: _confident(poses, places[name], least)
-            for name in chosen.names()
-            if name in places
-        }
-        x, y = points[chosen.position]
+        points = {}
+        for name in chosen.names():
+            if name not in own:
+                continue
+            x, y, confidence = read(own[name])
+            seen = np.isfinite(x) & np.isfinite(y)
+            known += int(seen.sum())
+            if confidence is not None and np.isfinite(confidence).any():
+                confident = True
+                unsure = seen & (confidence < least)  # a confidence that is missing says nothing
+                x[unsure] = y[unsure] = np.nan
+                dropped += int(unsure.sum())
+            points[name] = (x, y)
         theta = None
         if chosen.heading is not None and set(chosen.heading) <= set(points):
             theta = angle_between(points[chosen.heading[0]], points[chosen.heading[1]])
-        bodies.append(RawBody(individual, clock, x, y, theta))
-    notes = _notes(poses, bodies, options, least=least, usual=usual)
-    return RawRecording(bodies, length_unit="px", has_keypoints=True, notes=notes)
-
-
-def _confident(poses: Poses[Place], place: Place, least: float) -> tuple[Array, Array]:
-    """Return the positions of a keypoint, missing where it was not seen with confidence."""
-    x, y, confidence = poses.read(place)
-    seen = np.isfinite(x) & np.isfinite(y)
-    poses.seen += int(seen.sum())
-    if confidence is not None and np.isfinite(confidence).any():
-        poses.confident = True
-        unsure = seen & (confidence < least)  # a confidence that is missing says nothing
-        x[unsure] = y[unsure] = np.nan
-        poses.dropped += int(unsure.sum())
-    return x, y
-
-
-def _notes(
-    poses: Poses[Place],
-    bodies: list[RawBody],
-    options: ReadOptions,
-    *,
-    least: float,
-    usual: Confidence,
-) -> list[str]:
-    notes = []
-    without = [name for name in poses.individuals if name not in {body.name for body in bodies}]
+        bodies.append(RawBody(individual, clock, *points[chosen.position], theta))
+    without = [name for name in places if name not in {body.name for body in bodies}]
     if without:
         notes.append(f"without the keypoint, and left out: {listed(without)}")
-    if not poses.confident:
-        if options.min_confidence is not None:
+    if not confident:
+        if stated:
             raise InputError("the file holds no confidences: leave `min_confidence` out")
-        return [*notes, "the file holds no confidences: every position counts as seen"]
-    source = "" if options.min_confidence is not None else f" ({usual.reason})"
-    change = "" if options.min_confidence is not None else "; `min_confidence` changes it"
-    notes.append(
-        f"keypoints seen with a confidence below {least:g}{source} are missing: {poses.dropped} of "
-        f"{poses.seen}{change}"
-    )
-    return notes
+        notes.append("the file holds no confidences: every position counts as seen")
+    else:
+        source, change = (
+            ("", "") if stated else (f" ({usual.reason})", "; `min_confidence` changes it")
+        )
+        notes.append(
+            f"keypoints seen with a confidence below {least:g}{source} are missing: {dropped} of "
+            f"{known}{change}"
+        )
+    return RawRecording(bodies, length_unit="px", has_keypoints=True, notes=notes)
 
 
 def two_names(heading: Sequence[str] | None) -> tuple[str, str] | None:

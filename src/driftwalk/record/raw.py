@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.record.vocabulary import words
 
 NAMELESS = words("#N/A NaN nan NAN NA N/A null NULL None none -nan") | {""}
@@ -93,6 +93,12 @@ class RawBody:
     """Orientation, shape (n,), wrapped or not; None when the file has none."""
     extra: dict[str, Array] = field(default_factory=dict, kw_only=True)
     """Further values of each sample, shape (n, ...), by name; see `RawRecording.extra`."""
+
+    def take(self, rows: Bools | Integers) -> RawBody:
+        """Return the body with these rows alone."""
+        theta = None if self.theta is None else self.theta[rows]
+        extra = {name: values[rows] for name, values in self.extra.items()}
+        return RawBody(self.name, self.clock[rows], self.x[rows], self.y[rows], theta, extra=extra)
 
     def blank(self, lost: Bools) -> None:
         """Make rows missing, in new arrays."""

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools
 from driftwalk.core.errors import InputError
 from driftwalk.record.raw import Array, RawBody, RawRecording, TableLayout
 from driftwalk.record.text import read_table
@@ -45,7 +44,10 @@ class Plane:
     @property
     def vectors(self) -> Array:
         """Unit vectors of x, y and up in the axes of the file, shape (3, 3)."""
-        return np.array([_vector(name) for name in (self.x, self.y, self.up)])
+        vectors = np.zeros((3, 3))  # so that no axis gets a minus zero
+        for vector, name in zip(vectors, (self.x, self.y, self.up), strict=True):
+            vector["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
+        return vectors
 
     def describe(self) -> str:
         """Return the plane in words.
@@ -82,13 +84,6 @@ def plane_of(up: str) -> Plane:
     return Plane(name, *_PLANES[name])
 
 
-def _vector(name: str) -> Array:
-    # Added to zeros, so that no axis gets a minus zero.
-    vector = np.zeros(3)
-    vector["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
-    return vector
-
-
 QUATERNION: Final = "quaternion"
 VECTOR: Final = "vector"
 MATRIX: Final = "matrix"
@@ -120,7 +115,11 @@ class Turns:
             When quaternions have not the length 1.
         """
         angle, tilt = np.full(len(self.values), np.nan), np.full(len(self.values), np.nan)
-        known = self._known()
+        known = np.isfinite(self.values).all(axis=1)
+        if self.form in (QUATERNION, MATRIX):
+            # Zeros alone are how some programs write that there is none.
+            # float64 does not hold the squares of much smaller numbers.
+            known = known & (np.abs(self.values) > 1e-12).any(axis=1)
         if not known.any():
             return angle, tilt
         rotation = self._rotation(self.values[known])
@@ -130,36 +129,24 @@ class Turns:
         tilt[known] = np.arccos(np.clip(rotation.apply(up) @ up, -1.0, 1.0))
         return angle, tilt
 
-    def _known(self) -> Bools:
-        known = np.isfinite(self.values).all(axis=1)
-        if self.form in (QUATERNION, MATRIX):
-            # Zeros alone are how some programs write that there is none.
-            # float64 does not hold the squares of much smaller numbers.
-            known = known & (np.abs(self.values) > 1e-12).any(axis=1)
-        return np.asarray(known)
-
     def _rotation(self, values: Array) -> Rotation:
         from scipy.spatial.transform import Rotation
 
         if self.form == QUATERNION:
-            _require_unit_length(values)
+            with np.errstate(over="ignore"):
+                length = float(np.median(np.linalg.norm(values, axis=1)))
+            # Printed with three digits, a unit quaternion keeps its length to within 2 %.
+            if not abs(length - 1.0) <= 0.02:
+                raise InputError(
+                    f"the quaternions have a length of {length:.4g} instead of 1: are their "
+                    "columns x, y, z, w the right ones?"
+                )
             return Rotation.from_quat(values)
         if self.form == MATRIX:
             return Rotation.from_matrix(values.reshape(-1, 3, 3).transpose(0, 2, 1))
         if self.form == VECTOR:
             return Rotation.from_rotvec(values, degrees=self.degrees)
         return Rotation.from_euler(self.form, values, degrees=self.degrees)
-
-
-def _require_unit_length(quaternions: Array) -> None:
-    with np.errstate(over="ignore"):
-        length = float(np.median(np.linalg.norm(quaternions, axis=1)))
-    # Printed with three digits, a unit quaternion keeps its length to within 2 %.
-    if not abs(length - 1.0) <= 0.02:
-        raise InputError(
-            f"the quaternions have a length of {length:.4g} instead of 1: are their columns "
-            "x, y, z, w the right ones?"
-        )
 
 
 MOST_TILT: Final = math.radians(30.0)

@@ -325,7 +325,9 @@ class _Collected:
                 values = self._from_origin(values)
             self._parts[column].append(values.astype(np.float64))
         for column, seen in self._labels.items():
-            self._parts[column].append(_encode(frame[column], seen))
+            local, texts = frame[column].fillna("").astype(str).factorize()
+            index = [seen.setdefault(str(text), len(seen)) for text in texts]
+            self._parts[column].append(np.array(index, dtype=np.int32)[local])
         if self._stamps:
             self._parts[self._layout.stamps[0]].append(self._clock(frame, block, line))
 
@@ -355,14 +357,14 @@ class _Collected:
         for decimal in (".", ",") if undecided else self._decimal:
             try:
                 frame = _parse(block, layout, line=line, decimal=decimal)
+                numeric = all(frame[column].dtype.kind in "iuf" for column in layout.numbers)
+                if numeric and (decimal == self._decimal or self._only_whole()):
+                    self._decimal = decimal
+                    return frame
+                check_lines(block, layout, line=line, decimal=decimal)
+                raise FormatError("has a column that is not numbers", line=line)
             except FormatError as error:
                 errors.append(error)
-                continue
-            numeric = all(frame[column].dtype.kind in "iuf" for column in layout.numbers)
-            if numeric and (decimal == self._decimal or self._only_whole()):
-                self._decimal = decimal
-                return frame
-            errors.append(_bad_row(block, layout, line=line, decimal=decimal))
         # With the sign that is wrong an earlier row is the first that cannot be read.
         raise max(errors, key=lambda error: (error.line or 0, error.column or 0))
 
@@ -389,27 +391,13 @@ class _Collected:
             column = self._layout.stamps[0]
             clock, self._origin = clock_of_stamps(ticks, self._origin)
         except StampError as error:
+            rows = (at for at, of in enumerate(block.split(b"\n"), start=line) if of.strip())
             raise FormatError(
                 f"{error} (column '{self._layout.names[column]}')",
-                line=line + _line_of_row(block, error.row),
+                line=next(islice(rows, error.row, None), line),
                 column=column + 1,
             ) from error
         return clock
-
-
-def _bad_row(block: bytes, layout: TableLayout, *, line: int, decimal: str) -> FormatError:
-    """Return what is wrong with a block whose columns of numbers are none."""
-    try:
-        check_lines(block, layout, line=line, decimal=decimal)
-    except FormatError as error:
-        return error
-    return FormatError("has a column that is not numbers", line=line)
-
-
-def _line_of_row(block: bytes, row: int) -> int:
-    """Return the line of a block, from 0, in which a row of data stands."""
-    lines = (at for at, line in enumerate(block.split(b"\n")) if line.strip())
-    return next(islice(lines, row, None), 0)
 
 
 def far_origin(values: npt.NDArray[Any]) -> int:
@@ -524,12 +512,3 @@ def _quoted(characters: npt.NDArray[np.uint8], starts: Integers) -> Bools:
     within = before - np.repeat(before[starts] - marks[starts], lengths)
     closed = np.repeat(per_line % 2 == 0, lengths)
     return np.asarray((within % 2 == 1) & closed)
-
-
-def _encode(values: Any, seen: dict[str, int]) -> Codes:
-    """Turn the texts of a column into numbers, adding new ones to `seen`."""
-    import pandas as pd
-
-    local, found = pd.factorize(values.fillna("").astype(str))
-    index = np.array([seen.setdefault(str(text), len(seen)) for text in found], dtype=np.int32)
-    return index[local]

@@ -88,7 +88,7 @@ INNER: Final = words("mm cm um µm μm nm dm px pixel pixels deg degrees rad mra
 """Units that never name a body: they also count in the middle of a name (x_mm_filtered)."""
 
 IMAGE_WORDS: Final = words(
-    "p pos posn position center centre centroid image coord coordinate mitte schwerpunkt "
+    "is p pos posn position center centre centroid image coord coordinate mitte schwerpunkt "
     "mittelpunkt posición posicion centro posizione centroide"
 )
 """Words next to x or y that name no body. They hint at an image: such lengths are not metres."""
@@ -99,6 +99,8 @@ NO_POSITION: Final = words(
     "geschwindigkeit vitesse velocidad velocità kraft per"
 )
 """Words next to a coordinate or an angle that rule out a position."""
+DIRECTIONS: Final = words("dir direction euler rotations normal")
+"""Words next to x, y or z that make it a part of a direction."""
 SETPOINTS: Final = words(
     "ref reference cmd command commanded goal target tgt setpoint setp sp desired des demand "
     "origin wind current waypoint wp offset soll sollwert consigne consigna expected planned "
@@ -107,7 +109,8 @@ SETPOINTS: Final = words(
 """Words of pairs that are not a body if there is another pair: setpoints, and what moves it."""
 VARIANTS: Final = words(
     "raw filt filtered smooth smoothed est estimate estimated true truth gt meas measured "
-    "pred predicted kf ekf interp interpolated corrected mean hat odom odometry gps imu"
+    "pred predicted kf ekf interp interpolated corrected mean hat odom odometry gps imu "
+    "cam world screen img global local"
 )
 """Words of pairs that repeat a body, from before or after processing."""
 TIME_WORDS: Final = words(

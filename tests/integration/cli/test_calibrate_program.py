@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[3]
 PYTHON = shlex.quote(sys.executable)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_the_parameters_of_a_robot_in_mujoco_are_recovered(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -26,6 +26,8 @@ def test_the_parameters_of_a_robot_in_mujoco_are_recovered(
 
     Of two intervals of 90 % one misses in a fifth of recordings. The seeds of the recording and of
     its calibration are fixed, so the test fails only when the numbers change.
+
+    In every run: `test_a_program_is_calibrated`, on a program that is no physics engine.
     """
     pytest.importorskip("mujoco", reason="mujoco-core is not installed: make .venv/.test-tools")
     leave_out_figures(monkeypatch)

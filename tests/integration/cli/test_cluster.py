@@ -158,9 +158,16 @@ def test_a_worker_killed_in_mid_unit_changes_nothing(tmp_path: Path) -> None:
 
 
 def test_a_unit_that_kills_every_worker_is_named_and_the_rest_kept(tmp_path: Path) -> None:
-    said = sweep("fatal", tmp_path / "fatal")
+    # Dask gives up a worker that takes longer than this to come back; on a loaded machine some take
+    # longer than the usual 15 s. Others take its place.
+    environment = {
+        **os.environ,
+        "DASK_DISTRIBUTED__DEPLOY__LOST_WORKER_TIMEOUT": "1s",
+        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1",
+    }
+    said = sweep("fatal", tmp_path / "fatal", environment=environment)
     assert said.startswith("ERROR unit 00000003-00000004")
-    assert "ended all 4 workers" in said
+    assert "ended all 2 workers" in said
     # Two others at most were with workers that ended as often, and were still to be tried alone.
     assert 13 <= len(shards_of(tmp_path / "fatal")) < 16
     # At home, where nothing kills it, the sweep goes on from there.

@@ -1,4 +1,7 @@
-"""`driftwalk demo`: two runs of the bundled recording, which another engine simulated."""
+"""`driftwalk demo`: two runs of the bundled recording, which another engine simulated.
+
+In every run `.ci/wheel_run.py` holds the answers of a whole demo against the truth.
+"""
 
 from __future__ import annotations
 
@@ -67,7 +70,7 @@ def finished(killed: tuple[Path, Killed]) -> tuple[Path, Done]:
     return killed[0], apart("demo", "--quick", "--out", killed[0], before=SHORT, env=STRICT)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_both_answers_stand_beside_the_truth(finished: tuple[Path, Done]) -> None:
     folder, done = finished
     assert done.code == 0, done.err
@@ -92,14 +95,14 @@ def test_both_answers_stand_beside_the_truth(finished: tuple[Path, Done]) -> Non
         assert (folder / figure).stat().st_size > 1000
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_the_fit_is_told_before_the_map_is_begun(killed: tuple[Path, Killed]) -> None:
     # The map takes far longer than the reading of the line with the page of the fit.
     assert not any(name.startswith("calibrate/manifest") for name in killed[1].files)
     assert page_in(killed[1].page)["subtitle"] == "fit"
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_finished_demo_is_read(finished: tuple[Path, Done]) -> None:
     folder = finished[0]
     before = contents(folder)
@@ -122,7 +125,7 @@ def test_a_finished_demo_is_read(finished: tuple[Path, Done]) -> None:
     assert found["calibration"]["ks_distance"] < 2 * found["calibration"]["noise_floor"]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_demo_goes_on_after_its_fit(
     killed: tuple[Path, Killed], finished: tuple[Path, Done]
 ) -> None:

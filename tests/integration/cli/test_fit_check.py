@@ -108,12 +108,15 @@ def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path)
     assert found["check_left_out"] in page
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.usefixtures("no_figures")
 def test_a_robot_that_drives_itself_is_not_explained(
     shared_data: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    """A real recording: no truth, but an answer, its flow and a verdict."""
+    """A real recording: no truth, but an answer, its flow and a verdict.
+
+    In every run: `test_a_recording_that_is_not_explained_gets_the_reasons`.
+    """
     name = "destab_driveA_100pc_0_noisevar_10_randdur_600.csv"
     recording = shared_data("smarticles-rattling") / name
     study = STUDIES / "smarticles.toml"

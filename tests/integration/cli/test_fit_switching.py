@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -144,3 +145,21 @@ def test_named_flows_have_a_force_each(tmp_path: Path) -> None:
     assert here("report", tmp_path / "run", "-o", tmp_path / "page.html").code == 0
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "force in flow high" in page
+    # Each named flow is a mode of control, with its force.
+    plan = (*("--blocks", "2", "--target", "2", "--by", "10s", "--rounds", "1"), "--worlds", "20")
+    done = here("control", "plan", tmp_path / "run", *plan, "-o", tmp_path / "policy")
+    assert done.code == 0, done.err
+    assert "flow_settings" not in done.err
+    policy = xr.load_dataset(tmp_path / "policy" / "policy.nc")
+    assert policy["mode"].values.tolist() == ["low", "high"]
+    np.testing.assert_allclose(policy["force_std"][:, 0], found["flow_force_std_N"])
+    # The draws are as uncertain as the force of each flow; 99 of them give the sd to 7 %.
+    spread = np.log(policy["force_std"]).std("draw")
+    np.testing.assert_allclose(spread / spread[0], sd / sd[0], rtol=1e-6)
+    shutil.copytree(tmp_path / "run", tmp_path / "again")
+    both = here(
+        "control", "plan", tmp_path / "run", tmp_path / "again", *plan, "-o", tmp_path / "4"
+    )
+    assert both.code == 0, both.err
+    names = xr.load_dataset(tmp_path / "4" / "policy.nc")["mode"].values.tolist()
+    assert names == ["run low", "run high", "again low", "again high"]

@@ -51,9 +51,10 @@ def test_fit_with_all_that_it_can_do(shares: Shares) -> None:
     assert_forward(shares("fit", RECORDING, *TANK, *words))
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.usefixtures("no_figures")
 def test_fit_that_searches_pieces_first(shares: Shares) -> None:
+    """In every run: a fit with more stages, without pieces."""
     words = ("--from", "0", "--to", "1200s", "--spline-spacing", "3cm")
     assert_forward(shares("fit", RECORDING, *TANK, *words, "--no-check"))
 

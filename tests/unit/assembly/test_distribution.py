@@ -13,12 +13,11 @@ from driftwalk.assembly.outcomes.class_names import outcome_classes
 from driftwalk.assembly.outcomes.distribution import (
     class_at,
     class_names,
-    difference_interval,
     outcome_distribution,
-    proportion_interval,
     sampling_variance,
 )
 from driftwalk.core.errors import InputError
+from driftwalk.core.intervals import difference_interval, proportion_interval
 
 CLASSES = outcome_classes(4)
 SQUARE, BENT, PAIRS, PAIR, SINGLE = (

@@ -80,11 +80,14 @@ def test_a_law_searched_on_samples_further_apart_gives_the_same_fit(
     assert (apart < 0.3 * width)[known].all()
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_search_by_way_of_pieces_ends_where_one_of_the_whole_does(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each ends within 0.15 standard deviations of the mode, as its last step is below 0.25."""
+    """Each ends within 0.15 standard deviations of the mode, as its last step is below 0.25.
+
+    In every run the fit of the front page, of half an hour, begins with pieces.
+    """
     study = coarse_study()
     recording = driven(2, 1200.0, {})
     found = fit_motion(recording, study)

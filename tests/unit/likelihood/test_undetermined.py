@@ -20,7 +20,7 @@ from driftwalk.likelihood import angle_consistency, compare_laws, estimate_wall,
 from driftwalk.likelihood.check import run
 from driftwalk.likelihood.contacts import estimate as wall
 from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.interval_inflation import parameter_facts
+from driftwalk.likelihood.interval_inflation import parameter_facts, strips_error
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
@@ -165,6 +165,24 @@ def test_an_ordinary_interval_is_as_before() -> None:
     facts = parameter_facts(point, np.diag([0.01, 0.01, 0.01]), coarse_study())
     width = 0.1 * 1.6448536269514722
     ends = [0.7 * math.exp(-width), 0.7 * math.exp(width)]
+    np.testing.assert_allclose(facts["drag_coefficient_interval"], ends, rtol=1e-12)
+
+
+@pytest.mark.parametrize("strips", [2, 8, 64])
+def test_the_interval_of_a_turning_block_holds_the_drag_of_a_face_without_strips(
+    strips: int,
+) -> None:
+    """The torque of a pure spin of a square with h = 1: r (1 + r^2) per length of a face."""
+    half = strips // 2
+    centres = (np.arange(half) + 0.5) / half
+    integral = 0.5 + 0.25
+    of_strips = float((centres * (1.0 + centres**2)).mean())
+    assert strips_error(strips) == pytest.approx(1.0 - of_strips / integral, rel=1e-9)
+    point = Point(np.zeros((2, 4, 4)), math.log(0.7), -9.0, -16.0, -8.0, -5.0)
+    study = dw.apply_overrides(coarse_study(), {"block.strips_per_face": strips})
+    facts = parameter_facts(point, np.diag([0.01] * 5), study)
+    width = 0.1 * 1.6448536269514722
+    ends = [0.7 * math.exp(-width) * of_strips / integral, 0.7 * math.exp(width)]
     np.testing.assert_allclose(facts["drag_coefficient_interval"], ends, rtol=1e-12)
 
 

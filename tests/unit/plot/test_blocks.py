@@ -10,7 +10,7 @@ from matplotlib.patches import Circle
 from synthetic_assembly import assembly_end, assembly_path
 
 from driftwalk.core.errors import InputError
-from driftwalk.plot.parts.assembly_labels import PALETTE
+from driftwalk.plot.parts.style import PALETTE
 from driftwalk.plot.tank import (
     block_corners,
     plot_blocks,

@@ -85,9 +85,8 @@ def test_the_bad_cell_is_framed_in_centimetres(check: xr.Dataset) -> None:
     assert np.hypot(arrows.U, arrows.V).max() == pytest.approx(7.5)
     assert arrows.N == CELLS**2 - 1
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x (cm)", "y (cm)")
-    bar = ax.figure.axes[-1].get_ylabel()
-    assert "above 3.8, by chance" in bar
-    assert "one recording of twenty" in bar
+    assert ax.figure.axes[-1].get_ylabel() == "distance from zero (sd)"
+    assert "above 3.8, by chance in one recording of twenty" in ax.figure.get_supxlabel()
 
 
 def test_noise_is_white_where_all_is_well(check: xr.Dataset) -> None:

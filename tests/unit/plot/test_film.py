@@ -15,8 +15,8 @@ from synthetic_assembly import ARENA, assembly_end, assembly_path
 from driftwalk.core.errors import InputError
 from driftwalk.plot import film, write_animation
 from driftwalk.plot.parts import film_file
-from driftwalk.plot.parts.assembly_labels import PALETTE
 from driftwalk.plot.parts.film_file import FRAMES_PER_S
+from driftwalk.plot.parts.style import PALETTE
 from driftwalk.schema import build_trajectory
 
 

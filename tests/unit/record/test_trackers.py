@@ -164,8 +164,16 @@ def test_trackmate_xml(tmp_path: Path) -> None:
     [
         ("</AllSpots>", "", "is damaged XML: mismatched tag"),
         ('ID="7" name', 'ID="77" name', "track 4 has an edge to spot 7, which is not there"),
-        ('POSITION_X="1.5"', 'POSITION_X="1,5"', "line 6: an attribute is no number"),
-        ('POSITION_X="1.5"', 'X="1.5"', "line 6: an element lacks its attribute 'POSITION_X'"),
+        (
+            'POSITION_X="1.5"',
+            'POSITION_X="1,5"',
+            "line 6: is damaged XML: could not convert string",
+        ),
+        (
+            'POSITION_X="1.5"',
+            'X="1.5"',
+            "line 6: is damaged XML: an element lacks its attribute 'POSITION_X'",
+        ),
         ('<TrackID TRACK_ID="4" />', "", "no track is kept"),
         ("<Model", "<Moodel", "damaged XML|holds no spots"),
         ("<TrackMate", '<!DOCTYPE a [<!ENTITY b "c">]>\n<TrackMate', "defines a document type"),
@@ -400,7 +408,7 @@ def test_trex_csv(tmp_path: Path) -> None:
     np.testing.assert_allclose(dataset["x"].values[:, 0], [0.02, np.nan, 0.025])
     np.testing.assert_allclose(body_track(dataset).theta, -0.5)
     lost = write(tmp_path / "x.csv", "frame,X#wcentroid (cm),blobid", "0,1,2")
-    with pytest.raises(FormatError, match="has no position"):
+    with pytest.raises(FormatError, match="has no point 'wcentroid' in x and y"):
         load(lost, frame_rate=10.0)
 
 

@@ -7,6 +7,7 @@ import { type Kind, type RawSection, SECTIONS, type SectionOf } from "../page";
 import { rich } from "../symbols";
 import { drawBiplot } from "./biplot";
 import { drawChosenTimes } from "./chosen_times";
+import { drawClassGraph } from "./class_graph";
 import { drawClassTimes } from "./class_times";
 import { drawClasses } from "./classes";
 import { drawEmpty } from "./empty";
@@ -41,6 +42,7 @@ const DRAWERS: Partial<{ [K in Kind]: Draw<K> }> = {
   l1_map: drawL1Map,
   setting_times: drawChosenTimes,
   biplot: drawBiplot,
+  class_graph: drawClassGraph,
   replay: drawReplay,
   table: drawTable,
   manifest: drawManifest,

@@ -9,9 +9,10 @@ DRIFTWALK_LANES_BEGIN
 // Where what is kept of a world begins, in bytes.
 template <class Real>
 struct KeptLayout {
-  static constexpr std::size_t words = sizeof(Member<Real>) / sizeof(Int32) / Numbers<Real>::lanes;
+  static constexpr std::size_t word = sizeof(typename Numbers<Real>::Scalar);
+  static constexpr std::size_t words = sizeof(Member<Real>) / word / Numbers<Real>::lanes;
   static_assert(Numbers<Real>::lanes == 1 ||
-                words * sizeof(Int32) * Numbers<Real>::lanes == sizeof(Member<Real>));
+                words * word * Numbers<Real>::lanes == sizeof(Member<Real>));
   std::size_t books, bonds, members, member, size;
 
   // `rows` of a world; where it has its pack alone, whole rows of lanes.
@@ -19,7 +20,7 @@ struct KeptLayout {
       : books(sizeof(LaneBook)),
         bonds(books + static_cast<std::size_t>(blocks) * sizeof(BlockBook)),
         members(bonds + static_cast<std::size_t>(bond_room(blocks)) * sizeof(Bond)),
-        member(one_world ? sizeof(Member<Real>) : words * sizeof(Int32)),
+        member(one_world ? sizeof(Member<Real>) : words * word),
         size(members + static_cast<std::size_t>(rows) * member) {}
 
   static std::size_t bytes(int blocks) {
@@ -29,21 +30,21 @@ struct KeptLayout {
   }
 };
 
-// One lane's words of a member: all its numbers are packs of 32-bit words.
+// One lane's words of a member: all its numbers are packs of words as wide as the scalar.
 template <class Real>
 inline void copy_lane(const Member<Real>& m, int lane, char* to) {
-  const char* const from = reinterpret_cast<const char*>(&m) + sizeof(Int32) * lane;
+  constexpr std::size_t word = KeptLayout<Real>::word;
+  const char* const from = reinterpret_cast<const char*>(&m) + word * lane;
   for (std::size_t k = 0; k < KeptLayout<Real>::words; ++k) {
-    std::memcpy(to + sizeof(Int32) * k, from + sizeof(Int32) * Numbers<Real>::lanes * k,
-                sizeof(Int32));
+    std::memcpy(to + word * k, from + word * Numbers<Real>::lanes * k, word);
   }
 }
 template <class Real>
 inline void copy_lane(const char* from, int lane, Member<Real>& m) {
-  char* const to = reinterpret_cast<char*>(&m) + sizeof(Int32) * lane;
+  constexpr std::size_t word = KeptLayout<Real>::word;
+  char* const to = reinterpret_cast<char*>(&m) + word * lane;
   for (std::size_t k = 0; k < KeptLayout<Real>::words; ++k) {
-    std::memcpy(to + sizeof(Int32) * Numbers<Real>::lanes * k, from + sizeof(Int32) * k,
-                sizeof(Int32));
+    std::memcpy(to + word * Numbers<Real>::lanes * k, from + word * k, word);
   }
 }
 

@@ -48,25 +48,31 @@ struct TankGroup {
   bool begins = false;                // they have no state yet
 };
 
-using GoOnLanes = void (*)(const Prepared<float>&, const AssemblyRules&, const TankGroup&,
-                           AssemblyScratch&);
-
-struct AssemblyKernel {
-  AssembleLanes run;
-  GoOnLanes go_on;
+template <class T>
+struct TankKernel {
+  void (*go_on)(const Prepared<T>&, const AssemblyRules&, const TankGroup&, AssemblyScratch&);
   int lanes;
   std::size_t (*scratch_bytes)(int blocks);
   std::size_t (*kept_bytes)(int blocks); // of one world
+};
+struct TankKernels {
+  TankKernel<float> single;
+  TankKernel<double> twice;
+};
+
+struct AssemblyKernel {
+  AssembleLanes run;
+  int lanes;
+  std::size_t (*scratch_bytes)(int blocks);
 };
 
 AssemblyKernel chosen_assembly_kernel();
 AssemblyKernel assembly_kernel_baseline();
 AssemblyKernel assembly_kernel_avx2();
 AssemblyKernel assembly_kernel_avx512();
-void go_on_baseline(const Prepared<float>&, const AssemblyRules&, const TankGroup&,
-                    AssemblyScratch&);
-void go_on_avx2(const Prepared<float>&, const AssemblyRules&, const TankGroup&, AssemblyScratch&);
-void go_on_avx512(const Prepared<float>&, const AssemblyRules&, const TankGroup&, AssemblyScratch&);
+TankKernels tank_kernels_baseline();
+TankKernels tank_kernels_avx2();
+TankKernels tank_kernels_avx512();
 
 // The same kernel in double precision, one world at a time.
 std::int64_t assemble_reference(const Prepared<double>&, const AssemblyRules&,

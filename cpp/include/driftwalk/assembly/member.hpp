@@ -68,6 +68,11 @@ template <class T, int N>
 inline T get(const Pack<T, N>& a, int lane) {
   return a.v[lane];
 }
+// Of a pack of doubles, integers are wide.
+template <int N>
+inline Int32 get(const Pack<std::int64_t, N>& a, int lane) {
+  return static_cast<Int32>(a.v[lane]);
+}
 template <class T>
   requires std::is_arithmetic_v<T>
 inline T get(const T& a, int) {
@@ -82,8 +87,8 @@ template <class T, class Value>
 inline void put(T& a, int, Value value) {
   a = static_cast<T>(value);
 }
-template <int N>
-inline void put(Mask<N>& a, int lane, bool value) {
+template <int N, class Word>
+inline void put(Mask<N, Word>& a, int lane, bool value) {
   a.v[lane] = value ? -1 : 0;
 }
 inline void put(bool& a, int, bool value) {
@@ -106,19 +111,18 @@ inline void put_rest(Motion<Real>& motion, int lane) {
 }
 
 // The value where the mask holds, else zero.
-template <int N>
-inline FloatPack<N> keep(Mask<N> mask, FloatPack<N> value) {
-  typedef typename IntPack<N>::Vector Bits;
-  return (typename FloatPack<N>::Vector)((Bits)value.v & mask.v);
+template <class T, int N>
+inline Pack<T, N> keep(MaskOf<T, N> mask, Pack<T, N> value) {
+  return (typename Pack<T, N>::Vector)((typename MaskOf<T, N>::Vector)value.v & mask.v);
 }
 template <class T>
   requires std::is_floating_point_v<T>
 inline T keep(bool mask, T value) {
   return mask ? value : T(0);
 }
-template <int N>
-inline Mask<N> equal(IntPack<N> a, IntPack<N> b) {
-  return {a.v == b.v};
+template <class T, int N>
+inline MaskOf<T, N> equal(Pack<T, N> a, Pack<T, N> b) {
+  return a == b;
 }
 inline bool equal(Int32 a, Int32 b) {
   return a == b;

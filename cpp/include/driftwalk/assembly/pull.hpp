@@ -65,6 +65,11 @@ inline FloatPack<N> look_up(const RadialTable& table, FloatPack<N> squared) {
   return value + slope * max(squared - start, FloatPack<N>(0.0f));
 }
 
+template <int N>
+inline DoublePack<N> look_up(const RadialTable& table, DoublePack<N> squared) {
+  return by_lanes(squared, [&](double one) { return look_up(table, one); });
+}
+
 // The squared distance from which on a table is 0.
 inline float end_of(const RadialTable& table) {
   const Int32 bits = (table.first + table.cells - 1) << 17;

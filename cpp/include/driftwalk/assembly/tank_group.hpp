@@ -90,7 +90,7 @@ inline void run_group(const Prepared<T>& run, const AssemblyRules& rules, const 
   const auto run_by = [&]<class Law>() {
     if (PackMemory<Real>::is_one_world(rules.blocks)) {
       TankPack<Real, T, Law, true>(run, rules, group, scratch).run();
-    } else if constexpr (Numbers<Real>::lanes > 1) {
+    } else {
       TankPack<Real, T, Law, false>(run, rules, group, scratch).run();
     }
   };

@@ -145,8 +145,8 @@ inline void load_between(const LaneTables<float>& lanes, const Int32* at, IntPac
 }
 
 // Keeps the compiler from extracting numbers lane by lane that it has just seen stored: slower.
-template <int Count>
-inline void keep_stored([[maybe_unused]] Int32 (&numbers)[Count]) {
+template <class T>
+inline void keep_stored([[maybe_unused]] T& numbers) {
 #if defined(DRIFTWALK_USE_X86)
   __asm__("" : "+m"(numbers));
 #endif
@@ -257,10 +257,105 @@ inline void look_up(const FlowView<double>& flow, double x, double y, double& u,
   v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) + (record[3] * (1 - fx) + next[3] * fx) * fy;
 }
 
+// The four numbers of each lane's record, `from` of them further on than its cell's first.
+template <int N, class Tables>
+[[gnu::always_inline]] inline void load_record(Tables tables, const Int32* at, int from,
+                                               DoublePack<N>* out) {
+  using Record = VectorOf<double, flow_record>::type;
+  const auto of = [&](int lane) {
+    const double* table;
+    if constexpr (std::is_same_v<Tables, const double*>) {
+      table = tables;
+    } else {
+      table = tables[lane];
+    }
+    Record found;
+    std::memcpy(&found, table + flow_record * std::int64_t(at[lane]) + from, sizeof found);
+    return found;
+  };
+  if constexpr (N == 8) {
+    const auto two = [&](int k) {
+#if defined(DRIFTWALK_USE_X86) && defined(__AVX512F__)
+      return (typename DoublePack<8>::Vector)_mm512_insertf64x4(
+          _mm512_castpd256_pd512((__m256d)of(k)), (__m256d)of(k + 2), 1);
+#else
+      return __builtin_shufflevector(of(k), of(k + 2), 0, 1, 2, 3, 4, 5, 6, 7);
+#endif
+    };
+    const auto a = two(0), b = two(1), c = two(4), d = two(5);
+    const auto even_low = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14);
+    const auto odd_low = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+    const auto even_high = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14);
+    const auto odd_high = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
+    out[0].v = __builtin_shufflevector(even_low, even_high, 0, 1, 4, 5, 8, 9, 12, 13);
+    out[1].v = __builtin_shufflevector(odd_low, odd_high, 0, 1, 4, 5, 8, 9, 12, 13);
+    out[2].v = __builtin_shufflevector(even_low, even_high, 2, 3, 6, 7, 10, 11, 14, 15);
+    out[3].v = __builtin_shufflevector(odd_low, odd_high, 2, 3, 6, 7, 10, 11, 14, 15);
+  } else if constexpr (N == 4) {
+    const Record a = of(0), b = of(1), c = of(2), d = of(3);
+    const Record even_low = __builtin_shufflevector(a, b, 0, 4, 2, 6);
+    const Record odd_low = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    const Record even_high = __builtin_shufflevector(c, d, 0, 4, 2, 6);
+    const Record odd_high = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+    out[0].v = __builtin_shufflevector(even_low, even_high, 0, 1, 4, 5);
+    out[1].v = __builtin_shufflevector(odd_low, odd_high, 0, 1, 4, 5);
+    out[2].v = __builtin_shufflevector(even_low, even_high, 2, 3, 6, 7);
+    out[3].v = __builtin_shufflevector(odd_low, odd_high, 2, 3, 6, 7);
+  } else {
+    static_assert(N == 2);
+    const Record a = of(0), b = of(1);
+    for (int k = 0; k < flow_record; ++k) {
+      out[k].v = typename DoublePack<N>::Vector{a[k], b[k]};
+    }
+  }
+}
+
+// The same for a pack.
+template <int N>
+[[gnu::always_inline]] inline void look_up(const FlowView<double>& flow, DoublePack<N> x,
+                                           DoublePack<N> y, DoublePack<N>& u, DoublePack<N>& v) {
+  using Real = DoublePack<N>;
+  const IntPack<N> column = narrow(x), row = narrow(y);
+  alignas(32) Int32 at[N];
+  store_cells((row << flow.stride_bits) + column, at);
+  keep_stored(at);
+  const Real fx = x - to_real(x, column), fy = y - to_real(y, row);
+  Real near[flow_record], next[flow_record];
+  if (flow.lanes == nullptr) {
+    load_record(flow.table, at, 0, near);
+    load_record(flow.table, at, flow_record, next);
+  } else {
+    Real after[2 * flow_record], weight;
+    load_record(flow.lanes->before, at, 0, near);
+    load_record(flow.lanes->before, at, flow_record, next);
+    load_record(flow.lanes->after, at, 0, after);
+    load_record(flow.lanes->after, at, flow_record, after + flow_record);
+    load_lanes(flow.lanes->weight, weight);
+    for (int k = 0; k < flow_record; ++k) {
+      near[k] = blend(near[k], after[k], weight);
+      next[k] = blend(next[k], after[k + flow_record], weight);
+    }
+  }
+  const Real left = 1.0 - fx, below = 1.0 - fy;
+  u = (near[0] * left + next[0] * fx) * below + (near[1] * left + next[1] * fx) * fy;
+  v = (near[2] * left + next[2] * fx) * below + (near[3] * left + next[3] * fx) * fy;
+}
+
 // Walks along a row and reads the flow at each place. Velocities come out divided by the table's
 // unit.
 template <class Real>
-class FlowCursor;
+class FlowCursor {
+public:
+  FlowCursor(const FlowView<double>& flow, Real x, Real y, Real step_x, Real step_y)
+      : flow_(flow), row_(x, y, step_x, step_y) {}
+
+  void read(Real& u, Real& v) const { look_up(flow_, row_.x, row_.y, u, v); }
+  void advance() { row_.advance(); }
+
+private:
+  const FlowView<double>& flow_;
+  FlowRow<Real> row_;
+};
 
 template <int N>
 class FlowCursor<FloatPack<N>> {
@@ -289,20 +384,6 @@ private:
   const FlowView<float>& flow_;
   FlowRow<Real> row_;
   FlowWeights<N> weights_;
-};
-
-template <>
-class FlowCursor<double> {
-public:
-  FlowCursor(const FlowView<double>& flow, double x, double y, double step_x, double step_y)
-      : flow_(flow), row_(x, y, step_x, step_y) {}
-
-  void read(double& u, double& v) const { look_up(flow_, row_.x, row_.y, u, v); }
-  void advance() { row_.advance(); }
-
-private:
-  const FlowView<double>& flow_;
-  FlowRow<double> row_;
 };
 
 // Reads the cells that have been found along rows.
@@ -345,15 +426,25 @@ template <int N>
   }
 }
 
-inline void read_rows(const FlowView<double>& flow, const FlowRow<double>* rows, int row_count,
-                      int count, double* u, double* v) {
+template <class Real>
+inline void walk_rows(const FlowView<double>& flow, const FlowRow<Real>* rows, int row_count,
+                      int count, Real* u, Real* v) {
   for (int r = 0; r < row_count; ++r) {
-    FlowRow<double> row = rows[r];
+    FlowRow<Real> row = rows[r];
     for (int k = 0; k < count; ++k) {
       look_up(flow, row.x, row.y, *u++, *v++);
       row.advance();
     }
   }
+}
+inline void read_rows(const FlowView<double>& flow, const FlowRow<double>* rows, int row_count,
+                      int count, double* u, double* v) {
+  walk_rows(flow, rows, row_count, count, u, v);
+}
+template <int N>
+[[gnu::noinline]] void read_rows(const FlowView<double>& flow, const FlowRow<DoublePack<N>>* rows,
+                                 int row_count, int count, DoublePack<N>* u, DoublePack<N>* v) {
+  walk_rows(flow, rows, row_count, count, u, v);
 }
 
 DRIFTWALK_LANES_END

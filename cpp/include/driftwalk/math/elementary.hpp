@@ -6,8 +6,7 @@
 // on [-8, 8], the worst of every seventh float there 1.65).
 #pragma once
 
-#include "driftwalk/math/elementary_double.hpp"
-#include "driftwalk/math/pack.hpp"
+#include "driftwalk/math/double_pack.hpp"
 
 DRIFTWALK_LANES_BEGIN
 

@@ -1,8 +1,9 @@
 // A pack of lanes, one world per lane, and the same operations on a single number.
 //
 // Physics is written once over a number type `Real`: Pack<float, W> in the batch kernels, double in
-// the reference, float in a GPU thread. Branches are select(mask, a, b). Only what the compiler
-// does not see by itself is written with intrinsics, and each has a plain form behind it.
+// the reference, Pack<double, W> (double_pack.hpp) where a batch has its bits, float in a GPU
+// thread. Branches are select(mask, a, b). Only what the compiler does not see by itself is written
+// with intrinsics, and each has a plain form behind it.
 #pragma once
 
 #include "driftwalk/config.hpp"
@@ -36,7 +37,8 @@ struct Pack {
 
   Pack() = default;
   DRIFTWALK_HD Pack(Vector value) : v(value) {}
-  DRIFTWALK_HD Pack(T value) : v(Vector{} + value) {}
+  // Of doubles minus zero: plus zero changes -0, which a single double keeps.
+  DRIFTWALK_HD Pack(T value) : v(sizeof(T) == 8 ? value - Vector{} : Vector{} + value) {}
 
   T operator[](int lane) const { return v[lane]; }
   void set(int lane, T value) { v[lane] = value; }
@@ -49,12 +51,20 @@ using IntPack = Pack<Int32, N>;
 template <int N>
 using UIntPack = Pack<UInt32, N>;
 
+// Integers as wide as a number.
+template <class T>
+using SignedAs = std::conditional_t<sizeof(T) == 8, std::int64_t, Int32>;
+template <class T>
+using UnsignedAs = std::make_unsigned_t<SignedAs<T>>;
+
 // A comparison of packs: all bits set in the lanes where it holds.
-template <int N>
+template <int N, class Word = Int32>
 struct Mask {
-  using Vector = typename VectorOf<Int32, N>::type;
+  using Vector = typename VectorOf<Word, N>::type;
   Vector v;
 };
+template <class T, int N>
+using MaskOf = Mask<N, SignedAs<T>>;
 
 // The companions of a number type: its mask, its integers, its scalar.
 template <class Real>
@@ -65,13 +75,13 @@ struct Numbers {
   using Int = Int32;
   using UInt = UInt32;
 };
-template <int N>
-struct Numbers<FloatPack<N>> {
+template <class T, int N>
+struct Numbers<Pack<T, N>> {
   static constexpr int lanes = N;
-  using Scalar = float;
-  using Bool = Mask<N>;
-  using Int = IntPack<N>;
-  using UInt = UIntPack<N>;
+  using Scalar = T;
+  using Bool = MaskOf<T, N>;
+  using Int = Pack<SignedAs<T>, N>;
+  using UInt = Pack<UnsignedAs<T>, N>;
 };
 
 #define DRIFTWALK_BINARY(op)                                                                       \
@@ -80,11 +90,11 @@ struct Numbers<FloatPack<N>> {
     return a.v op b.v;                                                                             \
   }                                                                                                \
   template <class T, int N>                                                                        \
-  inline Pack<T, N> operator op(Pack<T, N> a, T b) {                                               \
+  inline Pack<T, N> operator op(Pack<T, N> a, std::type_identity_t<T> b) {                         \
     return a.v op Pack<T, N>(b).v;                                                                 \
   }                                                                                                \
   template <class T, int N>                                                                        \
-  inline Pack<T, N> operator op(T a, Pack<T, N> b) {                                               \
+  inline Pack<T, N> operator op(std::type_identity_t<T> a, Pack<T, N> b) {                         \
     return Pack<T, N>(a).v op b.v;                                                                 \
   }
 DRIFTWALK_BINARY(+)
@@ -115,17 +125,13 @@ inline Pack<T, N>& operator+=(Pack<T, N>& a, Pack<T, N> b) {
 }
 
 #define DRIFTWALK_COMPARE(op)                                                                      \
-  template <int N>                                                                                 \
-  inline Mask<N> operator op(FloatPack<N> a, FloatPack<N> b) {                                     \
-    return {a.v op b.v};                                                                           \
+  template <class T, int N>                                                                        \
+  inline MaskOf<T, N> operator op(Pack<T, N> a, Pack<T, N> b) {                                    \
+    return {(typename MaskOf<T, N>::Vector)(a.v op b.v)};                                          \
   }                                                                                                \
-  template <int N>                                                                                 \
-  inline Mask<N> operator op(FloatPack<N> a, float b) {                                            \
-    return {a.v op FloatPack<N>(b).v};                                                             \
-  }                                                                                                \
-  template <int N>                                                                                 \
-  inline Mask<N> operator op(IntPack<N> a, Int32 b) {                                              \
-    return {a.v op IntPack<N>(b).v};                                                               \
+  template <class T, int N>                                                                        \
+  inline MaskOf<T, N> operator op(Pack<T, N> a, std::type_identity_t<T> b) {                       \
+    return a op Pack<T, N>(b);                                                                     \
   }
 DRIFTWALK_COMPARE(<)
 DRIFTWALK_COMPARE(>)
@@ -135,22 +141,22 @@ DRIFTWALK_COMPARE(==)
 DRIFTWALK_COMPARE(!=)
 #undef DRIFTWALK_COMPARE
 
-template <int N>
-inline Mask<N> operator&(Mask<N> a, Mask<N> b) {
+template <int N, class Word>
+inline Mask<N, Word> operator&(Mask<N, Word> a, Mask<N, Word> b) {
   return {a.v & b.v};
 }
-template <int N>
-inline Mask<N> operator|(Mask<N> a, Mask<N> b) {
+template <int N, class Word>
+inline Mask<N, Word> operator|(Mask<N, Word> a, Mask<N, Word> b) {
   return {a.v | b.v};
 }
-template <int N>
-inline Mask<N> operator!(Mask<N> a) {
+template <int N, class Word>
+inline Mask<N, Word> operator!(Mask<N, Word> a) {
   return {~a.v};
 }
 
 // --- select, any -------------------------------------------------------------------------------
 template <class T, int N>
-inline Pack<T, N> select(Mask<N> mask, Pack<T, N> yes, Pack<T, N> no) {
+inline Pack<T, N> select(MaskOf<T, N> mask, Pack<T, N> yes, Pack<T, N> no) {
   return mask.v ? yes.v : no.v;
 }
 template <class T>
@@ -339,9 +345,9 @@ DRIFTWALK_HD inline T to_real(T, Int32 a) {
   return static_cast<T>(a);
 }
 
-template <int N>
-inline IntPack<N> as_signed(UIntPack<N> a) {
-  return (typename IntPack<N>::Vector)a.v;
+template <class T, int N>
+inline Pack<SignedAs<T>, N> as_signed(Pack<T, N> a) {
+  return (typename Pack<SignedAs<T>, N>::Vector)a.v;
 }
 DRIFTWALK_HD inline Int32 as_signed(UInt32 a) {
   return static_cast<Int32>(a);
@@ -394,25 +400,25 @@ DRIFTWALK_HD inline void multiply_wide(UInt32 a, UInt32 b, UInt32& high, UInt32&
 }
 
 // --- loading one number per lane from an array of doubles ---------------------------------------
-template <int N>
-inline void load_lanes(const double* values, FloatPack<N>& out) {
+template <class T, int N>
+inline void load_lanes(const double* values, Pack<T, N>& out) {
   for (int lane = 0; lane < N; ++lane) {
-    out.v[lane] = static_cast<float>(values[lane]);
+    out.v[lane] = static_cast<T>(values[lane]);
   }
 }
 DRIFTWALK_HD inline void load_lanes(const double* values, double& out) {
   out = values[0];
 }
 
-template <int N>
-inline float lane_of(FloatPack<N> a, int lane) {
+template <class T, int N>
+inline T lane_of(Pack<T, N> a, int lane) {
   return a.v[lane];
 }
 DRIFTWALK_HD inline double lane_of(double a, int) {
   return a;
 }
-template <int N>
-inline bool lane_of(Mask<N> a, int lane) {
+template <int N, class Word>
+inline bool lane_of(Mask<N, Word> a, int lane) {
   return a.v[lane] != 0;
 }
 DRIFTWALK_HD inline bool lane_of(bool a, int) {

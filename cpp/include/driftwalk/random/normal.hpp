@@ -24,11 +24,17 @@ inline void normal_pair(UIntPack<N> word0, UIntPack<N> word1, FloatPack<N>& firs
   second = radius * sine;
 }
 
-DRIFTWALK_HD inline void normal_pair(UInt32 word0, UInt32 word1, double& first, double& second) {
-  const double uniform = (double(word0 >> 8) + 1.0) * 0x1p-24;
-  const double radius = __builtin_sqrt(-2.0 * log(uniform));
-  const double quarter = double(word1 >> 30) + double((word1 >> 8) & 0x3fffffu) * 0x1p-22 - 0.5;
-  double sine, cosine;
+// In double precision; words are 32 bits, whatever is above them.
+template <class Real>
+  requires std::is_same_v<typename Numbers<Real>::Scalar, double>
+DRIFTWALK_HD inline void normal_pair(typename Numbers<Real>::UInt word0,
+                                     typename Numbers<Real>::UInt word1, Real& first,
+                                     Real& second) {
+  const Real uniform = (to_real(first, as_signed((word0 >> 8) & 0xffffffu)) + 1.0) * 0x1p-24;
+  const Real radius = sqrt(-2.0 * log(uniform));
+  const Real quarter = to_real(first, as_signed((word1 >> 30) & 3u)) +
+                       to_real(first, as_signed((word1 >> 8) & 0x3fffffu)) * 0x1p-22 - 0.5;
+  Real sine, cosine;
   sincos(quarter * (pi_value / 2), sine, cosine);
   first = radius * cosine;
   second = radius * sine;

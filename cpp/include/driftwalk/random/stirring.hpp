@@ -17,9 +17,9 @@
 
 DRIFTWALK_LANES_BEGIN
 
-template <int N>
-inline UIntPack<N> as_unsigned(IntPack<N> a) {
-  return (typename UIntPack<N>::Vector)a.v;
+template <class T, int N>
+inline Pack<UnsignedAs<T>, N> as_unsigned(Pack<T, N> a) {
+  return (typename Pack<UnsignedAs<T>, N>::Vector)a.v;
 }
 inline UInt32 as_unsigned(Int32 a) {
   return static_cast<UInt32>(a);

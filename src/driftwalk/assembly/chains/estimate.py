@@ -32,7 +32,7 @@ from driftwalk.assembly.chains.mixing import (
 )
 from driftwalk.assembly.chains.predicted import passage, shares
 from driftwalk.assembly.outcomes.class_names import sort_classes
-from driftwalk.assembly.outcomes.event_rates import rate_interval
+from driftwalk.assembly.outcomes.event_rates import PARTS, clustering, rate_interval
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.answers.facts import texts
@@ -59,6 +59,11 @@ class KineticsPolicy(NamedTuple):
     """Samples that reach the target without which its time has no error; chosen by hand."""
     iterations: int = 30
     """Iterations of a replicate, which begins at the estimate."""
+    runs_per_part: int = 5
+    """Runs for each part of a class's time; the parts tell how events cluster. With 20 and 60 runs
+    the intervals of each transition held in 89 % or more (three settings of `studies/kinetics`)."""
+    most_parts: int = 50
+    """Such parts, at most: Student's quantile is that of the normal law within 2 %."""
     stored: int = 120
     """Steps of the stored curves."""
     confidence: float = 0.9
@@ -108,11 +113,11 @@ def kinetics(
     Returns
     -------
     xarray.Dataset
-        Kind "kinetics". ``rate`` [1/s] on (source, transition) with exact Poisson intervals;
-        ``share`` on (time, class), predicted, with ``empirical``; ``score`` on (model), mean
-        held-out log likelihood of a run; ``p_corrected`` on (test); with `target` ``committor`` and
-        ``passage_time`` [s] on (class); with `other` ``equal_p`` on (transition). The verdict is
-        ``attrs["verdict"]``.
+        Kind "kinetics". ``rate`` [1/s] on (source, transition) with Poisson intervals,
+        widened as far as events cluster; ``share`` on (time, class), predicted, with ``empirical``;
+        ``score`` on (model), mean held-out log likelihood of a run; ``p_corrected`` on (test); with
+        `target` ``committor`` and ``passage_time`` [s] on (class); with `other` ``equal_p`` on
+        (transition). The verdict is ``attrs["verdict"]``.
 
     Raises
     ------
@@ -341,13 +346,16 @@ class Replicate:
 def _rates(
     sets: Sequence[Histories], places: Integers, seed: int
 ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """Return N_ij, T_i, q_ij with exact Poisson intervals, and whether two sets have equal ones."""
+    """Return N_ij, T_i, q_ij with Poisson intervals, and whether two sets have equal rates."""
     counted = [counts_and_times(one) for one in sets]
     names = sets[0].classes
     pairs = [(int(i), int(j)) for i, j in places]
     number = np.array([[counts[pair] for pair in pairs] for counts, _ in counted])
     spent = np.array([[times[i] for i, _ in pairs] for _, times in counted])
-    low, high = rate_interval(number, spent, confidence=KINETICS_POLICY.confidence)
+    # Events of a run go together where the tank is not well mixed: they count as fewer.
+    fewer = 1.0 / np.array([[_clustering(one, *pair) for pair in pairs] for one in sets])
+    confidence = KINETICS_POLICY.confidence
+    low, high = rate_interval(number * fewer, spent * fewer, confidence=confidence)
     with np.errstate(divide="ignore", invalid="ignore"):
         rate, error = number / spent, np.sqrt(number) / spent
     dims = ("source", "transition")
@@ -372,6 +380,19 @@ def _rates(
         joint = float(np.nanmin(corrected)) if np.isfinite(p).any() else np.nan
         attrs = {"equal_p": joint, "other_runs": sets[1].runs}
     return data, coords, attrs
+
+
+def _clustering(found: Histories, state: int, target: int) -> float:
+    """Return by how much the transitions of a class cluster over the time that runs spent in it."""
+    own = found.state == state
+    if not own.any():
+        return 1.0
+    clock = np.cumsum(found.duration[own])
+    parts = np.clip(found.runs // KINETICS_POLICY.runs_per_part, PARTS, KINETICS_POLICY.most_parts)
+    return clustering(
+        clock[found.target[own] == target], float(clock[-1]), parts=int(parts),
+        confidence=KINETICS_POLICY.confidence,
+    )  # fmt: skip
 
 
 def _chosen(model: Model, pairs: Integers, again: Floats) -> dict[str, Any]:

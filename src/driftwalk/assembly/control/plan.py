@@ -21,10 +21,10 @@ from driftwalk.assembly.control.improvement import IMPROVEMENT_POLICY, cells_lik
 from driftwalk.assembly.control.modes import Modes
 from driftwalk.assembly.control.worlds import Setting, Worlds, decisions_of
 from driftwalk.assembly.outcomes.class_names import outcome_classes, target_class
-from driftwalk.assembly.outcomes.distribution import proportion_interval
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
+from driftwalk.core.intervals import proportion_interval
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import all_single
 from driftwalk.sweep import Store, grid, run_sweep

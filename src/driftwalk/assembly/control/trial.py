@@ -11,13 +11,13 @@ import numpy as np
 from driftwalk.assembly.control.plan import CONTROL_POLICY
 from driftwalk.assembly.control.stored import stored_modes, stored_rules, stored_wanted
 from driftwalk.assembly.control.worlds import Setting, Worlds
-from driftwalk.assembly.outcomes.distribution import difference_interval, proportion_interval
 from driftwalk.assembly.runs.dataset import build_path
 from driftwalk.assembly.runs.plan import make_plan
 from driftwalk.assembly.tank_batch import TankBatch
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
+from driftwalk.core.intervals import difference_interval, proportion_interval
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import is_one_assembly
 from driftwalk.sweep import Store, grid, run_sweep

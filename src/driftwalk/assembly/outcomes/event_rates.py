@@ -7,9 +7,9 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.distribution import check_confidence
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.intervals import check_confidence
 from driftwalk.schema.shapes import cells_of_shape
 
 PARTS: Final = 5

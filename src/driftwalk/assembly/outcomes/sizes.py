@@ -16,13 +16,13 @@ from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
 from driftwalk.assembly.outcomes.distribution import (
     NOT_COPIED,
-    check_confidence,
     duration,
     require_assembly,
     runs_with_outcome,
 )
 from driftwalk.assembly.outcomes.survival import checked_times
 from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.core.intervals import check_confidence
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.contact_graphs import discs_of
 from driftwalk.schema.shapes import cells_of_shape, counts_of_shape

@@ -13,16 +13,15 @@ import numpy as np
 from driftwalk.assembly.lattice.bonds import JOINING, PARTING
 from driftwalk.assembly.outcomes.distribution import (
     NOT_COPIED,
-    check_confidence,
     class_names,
     duration,
-    proportion_interval,
     require_assembly,
     runs_with_outcome,
 )
 from driftwalk.assembly.outcomes.event_rates import PARTS, clustering, rate_variables
 from driftwalk.assembly.outcomes.survival import survival_curve
 from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.core.intervals import check_confidence, proportion_interval
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import all_single
 

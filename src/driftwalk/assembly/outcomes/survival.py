@@ -16,12 +16,12 @@ from driftwalk.assembly.outcomes.distribution import (
     check_times,
     class_names,
     duration,
-    proportion_interval,
     require_assembly,
     runs_with_outcome,
 )
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
+from driftwalk.core.intervals import proportion_interval
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import all_single
 

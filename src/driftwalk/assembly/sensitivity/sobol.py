@@ -18,7 +18,6 @@ import numpy.typing as npt
 
 from driftwalk.assembly.outcomes.class_names import listed_classes
 from driftwalk.assembly.outcomes.distribution import (
-    check_confidence,
     is_complete,
     sampling_variance,
 )
@@ -35,6 +34,7 @@ from driftwalk.assembly.sensitivity.settings import (
 )
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.intervals import check_confidence
 from driftwalk.core.run_stages import Progress
 from driftwalk.schema.check import build_dataset, described, require_kind
 from driftwalk.schema.kinds import KINDS

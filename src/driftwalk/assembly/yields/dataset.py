@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from driftwalk.assembly.outcomes.distribution import proportion_interval
 from driftwalk.assembly.yields.arms import Arms, Runs
 from driftwalk.assembly.yields.selection import Selection, Tally
+from driftwalk.core.intervals import proportion_interval
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:

@@ -282,7 +282,7 @@ def _arms(
         if high - low < least:
             raise InputError(
                 f"ranges: {name} from {low:.9g} to {high:.9g} is too narrow, as settings have "
-                f"{SEARCH.digits} digits: widen it to {least:g}"
+                f"{SEARCH.digits} digits: make it at least {least:g} wide"
             )
     if not listed.values and not ranges:
         raise InputError(f"nothing varies: name settings to compare, out of {', '.join(KEYS)}")

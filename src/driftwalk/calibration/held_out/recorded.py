@@ -168,8 +168,9 @@ def scales_of(track: Track, *, step_interval: float, steps: Floats) -> Scales:
 def recorded_ranges(parameters: Sequence[Parameter], scales: Scales) -> tuple[Parameter, ...]:
     """Return the parameters with ranges that a recording of these scales can tell apart.
 
-    Speeds lie about the recorded one, times between half a step interval and a part of the
-    recording, rates below a turn per step, lengths below the size of what was covered. A range is
+    Speeds lie about the recorded one, times between half a step interval and a tenth of the
+    recording, rates below a turn per step, lengths below the size of what was covered. A body that
+    does not turn at the wall turns by less than a radian in a tenth of the recording. A range is
     the part of the parameter's own that lies there; where they do not meet, its own stays.
 
     Examples
@@ -189,7 +190,7 @@ def _ranged(parameter: Parameter, scales: Scales) -> Parameter:
         "m/s": (0.05 * scales.speed, max(2.0 * scales.fastest, 2.0 * scales.speed)),
         "s": (0.5 * scales.interval, 0.1 * scales.duration),
         "rad2/s": (1e-3 * per_step, 3.0 * per_step),
-        "rad/s": (0.02 * per_step, 5.0 * per_step),
+        "rad/s": (10.0 / scales.duration, 5.0 * per_step),
         "m": (0.01 * scales.size, scales.size),
         "m2/s": (1e-4 * scales.speed**2 * scales.interval, scales.speed**2 * scales.interval),
         "Hz": (0.02 * per_step, 2.0 * per_step),

@@ -69,7 +69,8 @@ def compare_models(
     The closest model, and those about as close, are matched with the recording by a hundred
     summaries of the motion, as in a calibration (`driftwalk.calibration.estimation`), and compared
     by their evidence. A model counts there if the recording's summaries are like those of its own
-    simulated recordings. While none is, models farther off are asked as well, five in all at most.
+    simulated recordings. While none with as few parameters is, models farther off are asked as
+    well, five in all at most.
 
     A model explains the recording where, in each aspect, it is no farther from the odd blocks than
     twice the distance of the recording's own parts, made of interleaved blocks, from each other,

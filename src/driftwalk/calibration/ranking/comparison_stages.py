@@ -205,18 +205,22 @@ class Stages:
     def evidence(self, held_out: Sequence[HeldOutScore]) -> dict[int, Evidence]:
         """Match the summaries with those that tie, and with others while none reproduces them.
 
-        Where one does, so is each walk of recorded steps that the distances do not reject: whether
-        it passes all tests is their power.
+        A model that does is no answer before those with fewer numbers were asked. Where one does,
+        so is each walk of recorded steps that the distances do not reject: whether it passes all
+        tests is their power.
         """
         if self.replicates < 2:
             return {}
         shortlist = shortlist_models(self.work.entries, held_out)
         found: dict[int, Evidence] = {}
         for number, index in enumerate(shortlist.models):
-            if number >= shortlist.tied and any(one.misfit.usual for one in found.values()):
-                break
+            numbers = [self.work.entries[k].numbers for k, one in found.items() if one.misfit.usual]
+            if number >= shortlist.tied and min(numbers, default=math.inf) <= (
+                self.work.entries[index].numbers
+            ):
+                continue
             planned = max(shortlist.tied, 1)
-            found[index] = self._matched(number, index, held_out[index].point, planned)
+            found[index] = self._matched(len(found), index, held_out[index].point, planned)
         walks = [
             index
             for index, entry in enumerate(self.work.entries)

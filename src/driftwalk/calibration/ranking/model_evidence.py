@@ -43,9 +43,12 @@ class EvidencePolicy(NamedTuple):
     and one of six models is far off."""
     most_models: int = 5
     """Most models that are matched: a bound on the time."""
-    rival: float = 10.0
-    """Difference of deviance below which models are equally likely: a discrepancy of a hundred has
-    an error of some 5, from the simulated covariance."""
+    rival: float = 20.0
+    """Difference of deviance below which a model is not rejected: two standard errors. A deviance
+    has one of 6.6, as 512 simulations give the covariance of a hundred summaries."""
+    doubt: float = 10.0
+    """Difference from which a model with more numbers leaves open whether the simpler one is right:
+    one standard error. The price of the numbers is in the deviance."""
     hopeless: float = 3.0
     """Discrepancy per summary above which a search is given up. The true model has 0.7 to 1.2;
     wrong ones would take three times as long."""
@@ -90,14 +93,17 @@ class EvidenceRanking(NamedTuple):
     """Others that are about as likely."""
 
     def as_good(self, entries: Sequence[Candidate], evidence: Mapping[int, Evidence]) -> list[int]:
-        """Return the rivals that are likelier than the best or have no more parameters."""
+        """Return the rivals that are likelier than the best or have no more parameters.
+
+        One with more of them has to be likelier than by chance.
+        """
         best = self.best
         return [
             k
             for k in self.rivals
             if best is not None
             and (
-                evidence[k].deviance < evidence[best].deviance
+                evidence[k].deviance < evidence[best].deviance - EVIDENCE.doubt
                 or entries[k].numbers <= entries[best].numbers
             )
         ]
@@ -109,8 +115,8 @@ class Shortlist(NamedTuple):
     models: tuple[int, ...]
     """Those that tie first, the closest before the others; their places among all models."""
     tied: int
-    """How many are asked in any case. The others are asked until one gives the summaries: a search
-    by distances may have missed the place of the true model."""
+    """How many are asked in any case. The others are asked until one with no more numbers gives the
+    summaries: a search by distances may have missed the place of the true model."""
 
 
 def shortlist_models(entries: Sequence[Candidate], held_out: Sequence[HeldOutScore]) -> Shortlist:

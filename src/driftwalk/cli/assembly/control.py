@@ -22,6 +22,8 @@ from driftwalk.core.study_keys import ASSEMBLY_KEYS
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.assembly import ModeSource
+
 UNITS = {"flow-scale": "1", "force-std": "N"}
 """Numbers of a mode that can be varied, with their units."""
 NAMES = (
@@ -51,7 +53,10 @@ def plan(
     by: Annotated[float, option("--by", "Deadline, such as 5min.", unit="s")],
     runs: Annotated[
         list[Path] | None,
-        argument("[RUN...]", "Fits or calibrations, one for each setting of the pumps."),
+        argument(
+            "[RUN...]",
+            "Fits or calibrations, one for each setting of the pumps, or a fit with switches.",
+        ),
     ] = None,
     flow: FlowFile = None,
     every: Annotated[float, option("--every", "Time between two decisions.", unit="s")] = 5.0,
@@ -83,7 +88,7 @@ def plan(
     A mode is a flow, a factor on it and a stochastic force: name a fit for each setting of the
     pumps, or one fit (or --flow) with --vary. If you stop the run, the same command continues it.
     """
-    from driftwalk.assembly import ModeSource, Wanted, make_modes
+    from driftwalk.assembly import Wanted, make_modes
     from driftwalk.runs import ControlPlanWork
 
     sources: list[Source] = [
@@ -91,18 +96,13 @@ def plan(
     ]
     strengths = vary_strengths(vary or [])
     seed = sources[0].study.assembly.seed
+    names = [run.name if len(sources) > 1 else "" for run in runs or [Path()]]
     modes = make_modes(
-        [
-            ModeSource(
-                one.study, one.flow, one.uncertainty,
-                "" if len(sources) == 1 or not runs else runs[at].name,
-            )
-            for at, one in enumerate(sources)
-        ],
+        [each for one, name in zip(sources, names, strict=True) for each in settings_of(one, name)],
         flow_scales=strengths.get("flow-scale", [1.0]),
         force_stds=strengths.get("force-std", []),
         seed=seed,
-    )  # fmt: skip
+    )
     inputs = {
         f"mode {at} {role}": path
         for at, one in enumerate(sources, start=1)
@@ -110,7 +110,10 @@ def plan(
     }
     wanted = Wanted(target, by, every, latency, missed, dwell)
     work = ControlPlanWork(modes, wanted, rounds, worlds, seed, inputs)
-    said = dict.fromkeys(text for one in sources for text in one.warnings)
+    # Each flow of a fit has its own force here.
+    said = dict.fromkeys(
+        text for one in sources for text in one.warnings if "`flow_settings`" not in text
+    )
     found: xr.Dataset = options.run(work, "control plan", warnings=[*said])
     print_result(found, options.out, json=options.json)
 
@@ -176,6 +179,25 @@ def run(
         raise InputError(f"--patience has to be above 0 s, got {patience:g} s")
     for line in pilot(_opened(policy)[0], host, int(port), patience_s=patience):
         print(json.dumps(line), flush=True)
+
+
+def settings_of(source: Source, name: str) -> list[ModeSource]:
+    """Return the setting of a run, or one for each flow of a fit whose pumps were switched."""
+    from driftwalk.assembly import ModeSource
+    from driftwalk.likelihood import flow_settings
+    from driftwalk.model import apply_overrides
+
+    study, fit = source.study, source.uncertainty
+    if fit is None or "flow" not in fit.dims or "time" not in source.flow.dims:
+        return [ModeSource(study, source.flow, fit, name)]
+    key = "forces.force_std_N"
+    return [
+        ModeSource(
+            apply_overrides(study, {key: own.study.forces.force_std_N}), own.flow, own.uncertainty,
+            f"{name} {label}".strip(),
+        )
+        for label, own in flow_settings(fit).items()
+    ]  # fmt: skip
 
 
 def vary_strengths(given: list[str]) -> dict[str, list[float]]:

@@ -278,6 +278,8 @@ def check_model(
         "detectable_of": ("criterion", texts([one.words for one in criteria])),
         **verdict_variables(verdict),
     }
+    notes = [one.note for one in criteria if one.note]
+    data |= {"note": ("note", texts(notes))} if notes else {}
     names = np.array([one.name for one in criteria], dtype=object)
     parts.append((data, {"criterion": ("criterion", names)}))
     variables: dict[str, Any] = {}

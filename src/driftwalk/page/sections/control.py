@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from driftwalk.core.intervals import proportion_interval
 from driftwalk.page.parts import (
     Maker,
     Section,
@@ -27,7 +28,6 @@ from driftwalk.schema.answers.control import (
     CONSTANT,
     GAIN,
     arm_table,
-    exact_interval,
     gain_text,
     gain_word,
     mode_table,
@@ -168,9 +168,9 @@ def share_section(test: xr.Dataset) -> Section:
     time, facts = test["time"].values, test.attrs
     drawn = []
     for name, share in zip(test["arm"].values, test["share"].values, strict=True):
-        ends = [exact_interval(one, facts["worlds"], facts["confidence"]) for one in share.tolist()]
-        low, high = np.transpose(ends)
-        drawn.append(series(str(name), time, share, ends=(low, high)))
+        count = np.rint(share * facts["worlds"])
+        ends = proportion_interval(count, facts["worlds"], confidence=facts["confidence"])
+        drawn.append(series(str(name), time, share, ends=ends))
     target = short_class(str(required(test, "target")))
     return chart(
         "share", "Target over time", f"Bands: {facts['confidence']:.0%} intervals.",

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from driftwalk.page.parts import (
     Maker,
@@ -13,6 +15,7 @@ from driftwalk.page.parts import (
     quantity,
     require,
     required,
+    section,
     section_of_table,
     sections_of,
     summary_section,
@@ -20,7 +23,9 @@ from driftwalk.page.parts import (
     table_section,
     value_of,
 )
-from driftwalk.page.sections.outcomes import class_times_section
+from driftwalk.page.sections.outcomes import cells_of, class_times_section
+from driftwalk.plot.kinetics import GRAPH_TITLE, class_graph_of, placed_arrows
+from driftwalk.plot.parts.polyomino_sketch import are_discs
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.kinetics import (
     choice_words,
@@ -37,6 +42,10 @@ from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
+
+GRAPH_PX: Final = 800.0
+ROW_PX: Final = 78.0
+"""Usual width of a page's graph, and height of a class with its name; chosen by eye."""
 
 
 def kinetics_sections(*, kinetics: xr.Dataset | None = None) -> list[Section]:
@@ -59,6 +68,7 @@ def kinetics_sections(*, kinetics: xr.Dataset | None = None) -> list[Section]:
     """
     parts: list[tuple[str, str, Maker]] = [
         ("shares", "Shares over time", shares_sections),
+        ("graph", "Graph of the classes", graph_section),
         ("rates", "Rates", rates_sections),
         ("tests", "Tests of a well-mixed tank", mixing_section),
         table_part("models", "Models", score_table),
@@ -141,6 +151,28 @@ def shares_sections(kinetics: xr.Dataset) -> list[Section]:
             | {"id": f"seen-{at}", "title": f"Shares seen{name}", "note": note}
         )
     return made
+
+
+def graph_section(kinetics: xr.Dataset) -> Section:
+    """Return the classes by their number of assemblies, and the rates between them as arrows."""
+    place, rows, kept = class_graph_of(kinetics)
+    unit = np.array([GRAPH_PX, ROW_PX * rows])
+    return section(
+        "graph", "class_graph", "Graph of the classes", f"{GRAPH_TITLE.capitalize()}.",
+        height=float(unit[1]),
+        classes=[
+            {"class": name, "x": x, "y": y, "cells": cells_of(name, discs=are_discs(*place))}
+            for name, (x, y) in place.items()
+        ],
+        arrows=[
+            {
+                "x": [float(one.first[0]), float(one.last[0])],
+                "y": [float(one.first[1]), float(one.last[1])],
+                "at": one.at, "share": one.share, "label": one.label,
+            }
+            for one in placed_arrows(place, kept, unit)
+        ],
+    )  # fmt: skip
 
 
 def rates_sections(kinetics: xr.Dataset) -> list[Section]:

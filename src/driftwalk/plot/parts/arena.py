@@ -110,6 +110,6 @@ def draw_scale_bar(ax: Axes) -> None:
     y = ax.get_ylim()[0]
     ax.plot([low, low + length], [y, y], color=INK, lw=1.5, clip_on=False, solid_capstyle="butt")
     ax.annotate(
-        f"{length:g} cm", (low, y), xytext=(0.0, 2.5), textcoords="offset points", size=6.0,
+        f"{length:g} cm", (low, y), xytext=(0.0, 2.5), textcoords="offset points",
         va="bottom",
     )  # fmt: skip

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.plot.parts.labels import DRAG_LABEL, force_interval_text, in_unit
-from driftwalk.plot.parts.style import BLUE, ORANGE
+from driftwalk.plot.parts.labels import DRAG_LABEL, force_label, in_unit
+from driftwalk.plot.parts.style import PALETTE
 from driftwalk.schema.check import kind_name
 from driftwalk.schema.shapes import is_one_assembly
 
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# Okabe and Ito's palette for colour-blind readers, without black and the pale yellow.
-PALETTE: Final = (BLUE, ORANGE, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A4B9A")
 GREYS: Final = ("#9a9a9a", "#6b6b6b", "#bdbdbd", "#4d4d4d", "#848484")
 OTHER: Final = "other"
 
@@ -207,7 +205,7 @@ def _sweep_axis(name: str, dataset: xr.Dataset) -> SweepAxis:
         return SweepAxis(name, label, np.arange(len(words), dtype=np.float64), words)
     label, unit, stored = _NUMBERS.get(name, (name.replace("_", " "), "", ""))
     if name == "force_std" and "force_interval_s" in dataset.attrs:
-        label += f",\n{force_interval_text(dataset)}"
+        label = force_label(dataset)
     if unit:
         return SweepAxis(name, label, in_unit(coordinate, unit, stored=stored), [])
     return SweepAxis(name, label, np.asarray(coordinate.values, dtype=np.float64), [])

@@ -59,6 +59,11 @@ def force_interval_text(calibration: xr.Dataset) -> str:
     return f"redrawn every {1e3 * float(interval_s):.4g} ms"
 
 
+def force_label(dataset: xr.Dataset) -> str:
+    """Return the label of an axis of σ_F, in one line; it says how often the force is redrawn."""
+    return rf"force $\sigma_F$ (mN), {force_interval_text(dataset)}"
+
+
 DRAG_LABEL = r"drag coefficient $C_d$"
 LENGTH_LABEL = "step length (mm)"
 # The paper says step angle for what the field calls turning angle.
@@ -142,7 +147,7 @@ class PlotParameter:
         if self.symbol == DRAG.symbol:
             return DRAG_LABEL
         if self.symbol == FORCE.symbol:
-            return r"stochastic force $\sigma_F$ (mN)," + f"\n{force_interval_text(calibration)}"
+            return force_label(calibration)
         return f"{self.symbol} ({self.unit})" if self.unit else self.symbol
 
     def values(self, calibration: xr.Dataset, prefix: str = "") -> Floats:

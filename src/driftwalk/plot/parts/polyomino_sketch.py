@@ -10,7 +10,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.plot.parts.style import BLUE, INK, axes_points
+from driftwalk.plot.parts.style import BLUE, FONT_PT, INK, axes_points
 from driftwalk.schema.contact_graphs import contacts_of, discs_of
 from driftwalk.schema.shapes import NAMED_SHAPES, cells_of_shape
 
@@ -23,7 +23,7 @@ Orientation = Literal["wide", "tall"]
 # Empty space between the shapes of a class, in sides of a block.
 GAP: Final = 0.6
 # Font size of the names under sketches, and how wide its letters are [pt].
-NAME_SIZE_PT: Final = 7.0
+NAME_SIZE_PT: Final = FONT_PT
 LETTER_PT: Final = 0.74 * NAME_SIZE_PT
 # Space between a sketch and its name [pt].
 NAME_GAP_PT: Final = 2.0

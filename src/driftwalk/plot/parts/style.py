@@ -45,33 +45,35 @@ HATCH = "#a0a0a0"
 # Okabe and Ito's palette for colour-blind readers.
 BLUE = "#0072B2"
 ORANGE = "#D55E00"
+# Without black and the pale yellow.
+PALETTE = (BLUE, ORANGE, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A4B9A")
+
+# One size for all words of a figure.
+FONT_PT = 7.0
 
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
-    "font.size": 8.0,
-    "axes.titlesize": 8.0,
-    "axes.labelsize": 8.0,
+    "font.size": FONT_PT,
+    "axes.titlesize": FONT_PT,
     "axes.linewidth": 0.6,
     "axes.edgecolor": INK,
     "axes.labelcolor": INK,
     "axes.titlepad": 4.0,
     "axes.labelpad": 3.0,
     "text.color": INK,
-    "xtick.labelsize": 7.0,
-    "ytick.labelsize": 7.0,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "xtick.major.size": 2.5,
     "ytick.major.size": 2.5,
     "xtick.color": INK,
     "ytick.color": INK,
-    "legend.fontsize": 7.0,
     "legend.frameon": False,
     "legend.handlelength": 1.6,
     "legend.columnspacing": 1.2,
     "lines.linewidth": 1.0,
     "hatch.linewidth": 0.5,
-    "figure.titlesize": 8.0,
+    "figure.titlesize": FONT_PT,
+    "figure.labelsize": FONT_PT,
     "figure.constrained_layout.h_pad": 0.03,
     "figure.constrained_layout.w_pad": 0.03,
     "savefig.dpi": 300.0,
@@ -95,11 +97,13 @@ def print_style() -> Iterator[None]:
     look alike on every machine.
     """
     import matplotlib
+    from cycler import cycler
 
     with _STYLE_LOCK, matplotlib.rc_context():
         matplotlib.rcdefaults()
         parameters: Any = matplotlib.rcParams
         parameters.update(STYLE)
+        parameters["axes.prop_cycle"] = cycler(color=PALETTE)
         yield
 
 
@@ -231,8 +235,9 @@ def add_colorbar(
 
 
 def add_footer(figure: Figure, text: str) -> None:
-    """Write a small remark at the lower edge of the figure."""
-    figure.supxlabel(text, x=0.995, ha="right", fontsize=6.0, color=MUTED)
+    """Write a remark at the lower edge of the figure, after those that are there."""
+    text = "; ".join(filter(None, (figure.get_supxlabel(), text)))
+    figure.supxlabel(text, x=0.995, ha="right", color=MUTED)
 
 
 def legend_above(figure: Figure, ax: Axes, columns: int) -> None:

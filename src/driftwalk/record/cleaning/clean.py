@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.record.cleaning.clock import overlap, starts_over
 from driftwalk.record.cleaning.jumps import PART, find_jumps
@@ -89,14 +88,14 @@ def clean_body(
     known = np.isfinite(body.clock)
     if not known.all():
         counts.without_time = int((~known).sum())
-        body = _take(body, known)
+        body = body.take(known)
     body = _in_order(body, counts, sort=sort, columns=columns)
     if start is not None or stop is not None:
         inside = np.ones(body.clock.size, dtype=bool)
         inside &= body.clock >= (-np.inf if start is None else start)
         inside &= body.clock <= (np.inf if stop is None else stop)
         counts.outside_window = int((~inside).sum())
-        body = _take(body, inside)
+        body = body.take(inside)
     repeated = body.clock[1:] == body.clock[:-1]
     if repeated.any():
         apart = times_in_two_places(body.clock, body.x, body.y, quantum=quantum)
@@ -104,9 +103,12 @@ def clean_body(
             refuse_several_bodies(body, apart, columns)
         counts.times_in_two_places = int(apart.size)
         counts.duplicates_dropped = int(repeated.sum())
-        body = _take(body, np.append(~repeated, True))
+        body = body.take(np.append(~repeated, True))
     _refuse_closest(body)
-    counts.missing = _blank_missing(body)
+    lost = ~(np.isfinite(body.x) & np.isfinite(body.y))
+    counts.missing = int(lost.sum())
+    if counts.missing:  # half a position is none
+        body.x[lost] = body.y[lost] = np.nan
     if body.theta is not None and not np.isfinite(body.theta).all():
         body.theta = np.where(np.isfinite(body.theta), body.theta, np.nan)
     if max_speed is not None:
@@ -114,15 +116,11 @@ def clean_body(
             raise InputError(f"`max_speed` must be above zero, got {max_speed} m/s")
         jumps = find_jumps(body, max_speed)
         counts.jumps_removed = int(jumps.size)
-        body = _without(body, jumps)
+        if jumps.size:
+            body = replace(body, x=body.x.copy(), y=body.y.copy())
+            body.x[jumps] = body.y[jumps] = np.nan
     counts.samples = int(np.isfinite(body.x).sum())
     return body, counts
-
-
-def _take(body: RawBody, rows: Bools | Integers) -> RawBody:
-    theta = None if body.theta is None else body.theta[rows]
-    extra = {name: values[rows] for name, values in body.extra.items()}
-    return RawBody(body.name, body.clock[rows], body.x[rows], body.y[rows], theta, extra=extra)
 
 
 def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns | None) -> RawBody:
@@ -147,7 +145,7 @@ def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns 
             f"followed by {body.clock[at + 1]:.6g} s ({backwards.size} such rows); {remedy}"
         )
     counts.unsorted = int(backwards.size)
-    return _take(body, np.argsort(body.clock, kind="stable"))
+    return body.take(np.argsort(body.clock, kind="stable"))
 
 
 def _refuse_closest(body: RawBody) -> None:
@@ -161,21 +159,3 @@ def _refuse_closest(body: RawBody) -> None:
                 f"two times of body '{body.name}' are {steps[at]:.3g} s apart, at "
                 f"{body.clock[start + at]:.6g} s: one of them is wrong"
             )
-
-
-def _blank_missing(body: RawBody) -> int:
-    """Make half a position no position; return the number of rows without one."""
-    lost = ~(np.isfinite(body.x) & np.isfinite(body.y))
-    count = int(lost.sum())
-    if count:
-        body.x[lost] = np.nan
-        body.y[lost] = np.nan
-    return count
-
-
-def _without(body: RawBody, rows: Integers) -> RawBody:
-    if not rows.size:
-        return body
-    x, y = body.x.copy(), body.y.copy()
-    x[rows] = y[rows] = np.nan
-    return RawBody(body.name, body.clock, x, y, body.theta, extra=body.extra)

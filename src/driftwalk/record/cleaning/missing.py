@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Integers
+from driftwalk.core.arrays import Bools
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.cleaning.jumps import squared_steps
 from driftwalk.record.raw import Array, RawBody, RawRecording
@@ -19,8 +19,10 @@ class MissingPolicy(NamedTuple):
 
     far: float = 8.0
     """Lengths of the usual step beyond which a place is far from its neighbours."""
+    far_whole: float = 4.0
+    """The same of a place whose numbers are whole, such as 0 or -1."""
     fewest: int = 2
-    """Samples in one place that are a mark where its numbers are whole, such as 0 or -1."""
+    """Samples in such a place that are a mark."""
     any_place: int = 4
     """Samples in any other place that are a mark."""
     held: int = 3
@@ -116,10 +118,10 @@ def _marks_of(body: RawBody) -> list[tuple[str, str]]:
     square = squared_steps(x, y)
     marks = []
     with np.errstate(over="ignore"):
-        far = np.flatnonzero(square > (MARK.far * usual) ** 2)
+        near, far = (square > (least * usual) ** 2 for least in (MARK.far_whole, MARK.far))
     # A place that is left and reached by long steps alone; noise has no such place.
-    if 0 < far.size <= x.size // 2:
-        marks += _far_places(x, y, far)
+    if 0 < near.sum() <= x.size // 2:
+        marks += _far_places(x, y, near, far)
     still = square == 0.0
     if 0.0 < still.mean() <= 1.0 - MARK.moving:
         runs, rows = _held_runs(square, still, usual)
@@ -131,9 +133,12 @@ def _marks_of(body: RawBody) -> list[tuple[str, str]]:
     return marks
 
 
-def _far_places(x: Array, y: Array, far: Integers) -> list[tuple[str, str]]:
+def _far_places(x: Array, y: Array, near: Bools, far: Bools) -> list[tuple[str, str]]:
     """Return the place that samples share exactly, and reach by far steps alone."""
-    reached = np.unique(np.concatenate([far, far + 1]))
+    by_near, by_far = (np.append(steps, False) | np.append(False, steps) for steps in (near, far))
+    reached = np.flatnonzero(by_near)
+    whole_there = (x[reached] % 1.0 == 0.0) & (y[reached] % 1.0 == 0.0)
+    reached = reached[by_far[reached] | whole_there]
     places, counts = np.unique(
         np.column_stack([x[reached], y[reached]]), axis=0, return_counts=True
     )
@@ -145,7 +150,8 @@ def _far_places(x: Array, y: Array, far: Integers) -> list[tuple[str, str]]:
         if count < (MARK.fewest if whole else MARK.any_place) or 2 * count >= x.size:
             continue
         edges = np.flatnonzero(there[1:] != there[:-1])
-        if not np.isin(edges, far).all() or np.hypot(x[~there] - px, y[~there] - py).min() <= 0.0:
+        leaps = (near if whole else far)[edges]
+        if not leaps.all() or np.hypot(x[~there] - px, y[~there] - py).min() <= 0.0:
             continue
         text = f"{px:.10g},{py:.10g}"
         what = f"is at exactly one place, {text} in the file, in {count} samples"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -135,13 +136,11 @@ def split_bodies(
         When there are more labels than bodies are read.
     """
     refuse_many_bodies(labels)
+    rows = RawBody(labels[0] if labels else "", clock, x, y, theta)
     if len(labels) == 1:
-        return [RawBody(labels[0], clock, x, y, theta)]
-    return [
-        RawBody(name, clock[at], x[at], y[at], None if theta is None else theta[at])
-        for name, at in zip(labels, rows_of_bodies(codes, number=len(labels)), strict=True)
-        if at.size
-    ]
+        return [rows]
+    places = zip(labels, rows_of_bodies(codes, number=len(labels)), strict=True)
+    return [replace(rows.take(at), name=name) for name, at in places if at.size]
 
 
 def rows_of_bodies(codes: Codes, *, number: int = 0) -> list[Integers]:
@@ -171,6 +170,23 @@ def number_codes(values: Array) -> tuple[Codes, list[str]]:
     """
     numbers, codes = np.unique(values, return_inverse=True)
     names = [str(int(number)) if number % 1 == 0 else f"{number:g}" for number in numbers.tolist()]
+    return codes.ravel().astype(np.int32), names
+
+
+def codes_in_arenas(
+    arenas: tuple[Codes, list[str]], targets: tuple[Codes, list[str]]
+) -> tuple[Codes, list[str]]:
+    """Return the index of each row's body, and names; each arena numbers its bodies from the first.
+
+    Examples
+    --------
+    >>> one = np.array([0, 0, 1], dtype=np.int32)
+    >>> codes_in_arenas((one, ["A", "B"]), (0 * one, ["1"]))[1]
+    ['A/1', 'B/1']
+    """
+    pairs, codes = np.unique(np.stack([arenas[0], targets[0]]), axis=1, return_inverse=True)
+    several = len(arenas[1]) > 1
+    names = [(f"{arenas[1][a]}/" if several else "") + targets[1][t] for a, t in pairs.T.tolist()]
     return codes.ravel().astype(np.int32), names
 
 

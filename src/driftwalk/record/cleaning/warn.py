@@ -56,12 +56,13 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
             f"the positions span only {extent:.3g} m: is the unit, or the scale, right?"
         )
     warnings += _clock_warnings(bodies)
-    speeds = [_usual_speed(body) for body in bodies]
-    if (
-        speeds
-        and max(speeds) > PLAUSIBLE.largest_speed_m_s
-        and extent <= PLAUSIBLE.largest_extent_m
-    ):
+    speeds = [0.0]
+    for body in bodies:
+        t, x, y = (np.diff(values[:10_000]) for values in (body.clock, body.x, body.y))
+        speed = np.hypot(x, y) / t
+        known = speed[np.isfinite(speed)]
+        speeds.append(float(np.median(known)) if known.size else 0.0)
+    if max(speeds) > PLAUSIBLE.largest_speed_m_s and extent <= PLAUSIBLE.largest_extent_m:
         warnings.append(f"the usual speed is {max(speeds):.3g} m/s: is the clock's unit right?")
     return warnings
 
@@ -113,13 +114,6 @@ def angle_warnings(raw: RawRecording) -> list[str]:
                 'name the unit, as in `columns={"theta": "NAME:deg"}`'
             ]
     return []
-
-
-def _usual_speed(body: RawBody) -> float:
-    steps = np.hypot(np.diff(body.x[:10_000]), np.diff(body.y[:10_000]))
-    speed = steps / np.diff(body.clock[:10_000])
-    known = speed[np.isfinite(speed)]
-    return float(np.median(known)) if known.size else 0.0
 
 
 class ExtentPolicy(NamedTuple):
@@ -204,22 +198,17 @@ def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
     for body in bodies:
         for name, values in (("x", body.x), ("y", body.y)):
             _refuse_beyond(body, name, values, EXTENT.farthest_m / scale)
-        _refuse_within(body, EXTENT.nearest_m / scale)
+        known = [
+            np.abs(axis).max(where=np.isfinite(axis), initial=0.0) for axis in (body.x, body.y)
+        ]
+        if 0.0 < max(known) < EXTENT.nearest_m / scale:
+            raise InputError(
+                f"body '{body.name}' has no position that is further than {max(known):.3g} from "
+                "the origin, in the file's unit: no camera sees that; are these the right columns, "
+                "and is the unit right (`length_unit`)?"
+            )
         if body.theta is not None:
             _refuse_beyond(body, "angle", body.theta, EXTENT.largest_angle)
-
-
-def _refuse_within(body: RawBody, least: float) -> None:
-    farthest = max(
-        float(np.abs(values).max(where=np.isfinite(values), initial=0.0))
-        for values in (body.x, body.y)
-    )
-    if 0.0 < farthest < least:
-        raise InputError(
-            f"body '{body.name}' has no position that is further than {farthest:.3g} from the "
-            "origin, in the file's unit: no camera sees that; are these the right columns, and is "
-            "the unit right (`length_unit`)?"
-        )
 
 
 def _refuse_beyond(body: RawBody, name: str, values: Array, most: float) -> None:

@@ -7,14 +7,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError, damaged_as
+from driftwalk.core.errors import InputError, damaged_as
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
-from driftwalk.record.stores.matlab import Struct, Value
 from driftwalk.record.stores.npz import NPY, ZIP, members, opened_npz
 from driftwalk.record.tables.in_memory import table_in_memory
-from driftwalk.record.tables.matlab import matlab_tables
+from driftwalk.record.tables.matlab import Struct, Value, matlab_tables
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.record.vocabulary import ALLOWED
 from driftwalk.schema.stores.netcdf import HDF5, file_start
@@ -62,15 +61,15 @@ def _holds_positions(path: Path) -> bool:
             if "#refs#" in contents.file:
                 # Cells and structs of MATLAB: its own loader knows which of them are recordings.
                 return False
-            inner = [one for one in contents.file.values() if hasattr(one, "keys")]
-            return any(_are_positions(_names_but_axes(one)) for one in (contents.file, *inner))
+            groups = [one for one in contents.file.values() if hasattr(one, "keys")]
+            # The axes of a grid are no positions.
+            names = (
+                {str(name) for name, one in group.items() if not getattr(one, "is_scale", False)}
+                for group in (contents.file, *groups)
+            )
+            return any(map(_are_positions, names))
     except InputError:
         return False
-
-
-def _names_but_axes(group: Any) -> set[str]:
-    """Return the names in a group of an HDF5 file, without those of the axes of a grid."""
-    return {str(name) for name, one in group.items() if not getattr(one, "is_scale", False)}
 
 
 def _of_array(path: Path, options: ReadOptions) -> RawRecording:
@@ -81,8 +80,6 @@ def _of_array(path: Path, options: ReadOptions) -> RawRecording:
         # There are more samples than quantities, whichever way they lie.
         array = array.T
     table = table_in_memory(array.ravel() if array.dtype.names is not None else array)
-    if table is None:
-        raise FormatError("holds no table")
     return recording_of(table, options)
 
 
@@ -159,23 +156,16 @@ class ArrowLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the columns."""
-        table = table_in_memory(_frame(path))
-        if table is None:
-            raise FormatError("holds no table")
-        return recording_of(table, options)
-
-
-def _frame(path: Path) -> Any:
-    """Return the columns as a DataFrame of pandas."""
-    try:
-        from pyarrow import feather, parquet
-    except ImportError as error:
-        raise InputError(
-            "Parquet and Feather need pyarrow: pip install 'driftwalk[arrow]', or save CSV"
-        ) from error
-    with damaged_as("by pyarrow", path):
-        is_parquet = file_start(path).startswith(_PARQUET)
-        return (parquet if is_parquet else feather).read_table(path).to_pandas()
+        try:
+            from pyarrow import feather, parquet
+        except ImportError as error:
+            raise InputError(
+                "Parquet and Feather need pyarrow: pip install 'driftwalk[arrow]', or save CSV"
+            ) from error
+        with damaged_as("by pyarrow", path):
+            is_parquet = file_start(path).startswith(_PARQUET)
+            frame = (parquet if is_parquet else feather).read_table(path).to_pandas()
+        return recording_of(table_in_memory(frame), options)
 
 
 LOADERS = (ArraysLoader(), ArrowLoader())

@@ -12,8 +12,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.core.files.bounded import MIB
 from driftwalk.core.text.json_text import MOST_BYTES, parse_json
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.tables.cells import objects
-from driftwalk.record.tables.in_memory import MemorySource
+from driftwalk.record.tables.in_memory import MemorySource, objects
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import open_binary
 from driftwalk.record.vocabulary import words
@@ -78,7 +77,7 @@ def _point(point: Any, index: int) -> list[float]:
         complete = 2 <= len(point) <= 3
     else:
         values, complete = [], False
-    if not complete or not all(value is None or _is_number(value) for value in values):
+    if not complete or not _numbers(values) or any(isinstance(one, bool) for one in values):
         raise FormatError(
             f'entry {index + 1} is {str(point)[:40]!r}, expected [x, y] or {{"x": .., "y": ..}}'
         )
@@ -86,10 +85,6 @@ def _point(point: Any, index: int) -> list[float]:
         return [np.nan if value is None else float(value) for value in values]
     except OverflowError as error:
         raise FormatError(f"entry {index + 1} is too large for a number") from error
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 class JsonLinesLoader:
@@ -129,17 +124,17 @@ class JsonLinesLoader:
 def _rows(entry: dict[str, Any], number: int) -> list[dict[str, Any]]:
     """Return a line as rows: one, or one for each object of the list that it holds."""
     flat = _flat(entry)
-    lists = [name for name, value in flat.items() if isinstance(value, list) and _objects(value)]
+    lists = [
+        name
+        for name, value in flat.items()
+        if isinstance(value, list) and all(isinstance(one, dict) for one in value)
+    ]
     if len(lists) > 1:
         raise FormatError(f"holds several lists of objects: {', '.join(lists)}", line=number)
     shared = {name: value for name, value in flat.items() if not isinstance(value, list)}
     if not lists:
         return [shared]
     return [{**shared, **_flat(one)} for one in flat[lists[0]]]
-
-
-def _objects(value: list[Any]) -> bool:
-    return all(isinstance(one, dict) for one in value)
 
 
 def _numbers(value: list[Any]) -> bool:

@@ -14,8 +14,13 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, listed
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.stores.matlab import Struct, Value, matlab_variables_of
-from driftwalk.record.tables.matlab import matlab_tables, only_matlab
+from driftwalk.record.tables.matlab import (
+    Struct,
+    Value,
+    matlab_tables,
+    matlab_variables_of,
+    only_matlab,
+)
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, matlab_variables
 
@@ -58,9 +63,11 @@ class MatlabTracksLoader:
 
     def sniff(self, head: bytes, path: Path) -> float:
         """Recognise the name of the variable."""
-        if not head.startswith((OLD, HDF5_BASED)):
+        known = head.startswith((OLD, HDF5_BASED)) and set(_READERS) & set(matlab_variables(path))
+        try:
+            return 0.9 if known and _tracks(path) is not None else 0.0
+        except FormatError:
             return 0.0
-        return 0.9 if set(_READERS) & set(matlab_variables(path)) and _known(path) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every body."""
@@ -78,14 +85,6 @@ def _tracks(path: Path) -> RawRecording | None:
     with matlab_variables_of(path) as variables:
         name = next((one for one in _READERS if one in variables), None)
         return None if name is None else _READERS[name](variables[name])
-
-
-def _known(path: Path) -> bool:
-    """Whether the variable of that name has the layout of its program."""
-    try:
-        return _tracks(path) is not None
-    except FormatError:
-        return False
 
 
 def _ctrax(value: Value) -> RawRecording | None:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -69,11 +70,36 @@ class HeadedFormat:
             if column.partition(":")[0] in names
         }
         rate = None if "t" in own else options.frame_rate_hz
-        stated = replace(options, columns=own, delimiter=",", box="none", frame_rate_hz=rate)
-        raw = recording_of(TextSource(path, stated), stated)
-        return replace(
-            raw, length_unit=self.length_unit, bare_length_is_si=False, body_columns=None
-        )
+        stated = replace(options, delimiter=",", frame_rate_hz=rate)
+        return described(path, stated, own, length_unit=self.length_unit)
+
+
+def described(
+    path: Path,
+    options: ReadOptions,
+    columns: Mapping[str, str],
+    layout: TableLayout | None = None,
+    **facts: Any,
+) -> RawRecording:
+    """Return the recording of a table of a known format.
+
+    Parameters
+    ----------
+    path : Path
+        Text file.
+    options : ReadOptions
+        What the user knows about it.
+    columns : mapping
+        From a quantity to its column, as `columns` of `load` has it; empty: as their names say.
+    layout : TableLayout, optional
+        Names of all columns and lines before the data; None: the header is in the file.
+    **facts
+        What the `RawRecording` says besides.
+    """
+    stated = replace(options, columns=dict(columns), box="none")
+    raw = recording_of(TextSource(path, stated, layout), stated)
+    known = {"bare_length_is_si": False, "bare_angle": False, "body_columns": None}
+    return replace(raw, **(known | facts))
 
 
 def side_by_side(

@@ -40,7 +40,9 @@ class Hdf5Contents:
         entry = self.file.get(name)
         if not isinstance(entry, h5py.Dataset) or entry.shape is None:
             raise FormatError(f"has no array '{name}'")
-        if not _is_readable(entry):
+        steps = entry.id.get_create_plist()
+        codes = (steps.get_filter(at)[0] for at in range(steps.get_nfilters()))
+        if not all(map(h5py.h5z.filter_avail, codes)):
             raise FormatError(
                 f"'{name}' is compressed by a filter that is not installed: save the file without "
                 "compression or with gzip, or as CSV"
@@ -72,15 +74,6 @@ class Hdf5Contents:
             As `array`.
         """
         return [text_of(value) for value in self.array(name).ravel().tolist()]
-
-
-def _is_readable(entry: h5py.Dataset) -> bool:
-    """Whether the filters that an array is stored by are there."""
-    import h5py
-
-    steps = entry.id.get_create_plist()
-    codes = (steps.get_filter(at)[0] for at in range(steps.get_nfilters()))
-    return all(h5py.h5z.filter_avail(code) for code in codes)
 
 
 def text_of(value: Any) -> str:

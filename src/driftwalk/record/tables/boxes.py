@@ -12,7 +12,7 @@ import numpy as np
 from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.cleaning.several_bodies import rows_of_bodies
-from driftwalk.record.column_names import ColumnMeaning, words_of
+from driftwalk.record.column_names import ColumnMeaning, split_brackets, words_of
 from driftwalk.record.raw import Array, ReadOptions, TableLayout
 from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS, words
 
@@ -129,17 +129,15 @@ def _sides(
         if meaning is not None and meaning.quantity in (*_CORNERS, "w", "h"):
             found[meaning.quantity], units[meaning.quantity], plain = at, meaning.unit, False
             continue
-        text = re.sub(r"[\[(].*", "", name).strip("#% \"'")
-        parts = [word.lower() for word in words_of(text)]
+        text, inside = split_brackets(name)
+        parts = words_of(text.lower())
         last = parts[-1] if len(parts) > 1 else ""
         unit = UNITS.get(last, "")
-        inside = re.search(r"[\[(]([^\])]*)", name)
-        below = source.units[at] if source.units else ""
-        stated = inside[1] if inside else below.strip("[]() ")
+        below = source.units[at].strip("[]() ").lower() if source.units else ""
         if unit in LENGTHS or last in NO_UNIT:
             parts.pop()
-        elif stated:
-            unit = UNITS.get(stated.lower(), "")
+        elif inside or below:
+            unit = UNITS.get(inside or below, "")
         word = "".join(parts)
         side = _FROM_ZERO.get(word, "") if from_zero else BOXES.get(word, "")
         if side in ("", "x", "y"):  # then the meaning decides, of a body without a name

@@ -11,8 +11,13 @@ from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
 from driftwalk.record.raw import LENGTH_UNITS, MISSING, ReadOptions
 from driftwalk.record.tables.boxes import find_box
-from driftwalk.record.tables.column_reading import ColumnReading, TableReading
-from driftwalk.record.tables.named_columns import NamedColumns, may_be_unit, shown
+from driftwalk.record.tables.named_columns import (
+    ColumnReading,
+    NamedColumns,
+    TableReading,
+    may_be_unit,
+    shown,
+)
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import OF_DAY
 from driftwalk.record.vocabulary import ALLOWED, FRONT, LENGTHS, MIDDLE, REAR
@@ -50,7 +55,12 @@ class _Reader(NamedColumns):
         self.choose()
         box = find_box(self.source, self.options, self.meanings, self.chosen)
         if box is not None:
-            self.drop(box.replaced, box.why)
+            around = [
+                at
+                for at, one in self.meanings.items()
+                if one.body.lower() in ("bbox", "bb", "box") and at not in box.sides.values()
+            ]
+            self.drop((*box.replaced, *around), box.why)
             self.result.box = box if box.sides else None
             self.result.notes += box.notes
         self.leave_out_other_pairs()
@@ -83,7 +93,13 @@ class _Reader(NamedColumns):
         if box is not None and (not bodies or not {"x", "y"} <= set(box.sides)):
             name = next((body for body in bodies if not body), "")
             bodies = {name: {**places.get(name, {}), **box.sides}}
-        elif box is not None and len(bodies) == 1:
+        elif box is not None:
+            if len(bodies) > 1:
+                raise InputError(
+                    f"a box stands next to several bodies, {listed([*map(repr, bodies)])}: leave "
+                    'out what it does not surround by `columns={"skip": "NAME+NAME"}`, or add '
+                    '`box="none"`'
+                )
             bodies = {name: {**one, **box.sides} for name, one in bodies.items()}
         if not bodies:
             raise InputError(
@@ -240,7 +256,10 @@ class _Reader(NamedColumns):
             chosen = part is not None and self.meanings[part].rank < 0
             if part is not None and (chosen or self._is_fraction(time, part)):
                 result.numbers = (time, part)
-            if meaning.rank == 0 and not meaning.unit and self._is_of_ros(time):
+            first = next(iter(self._sampled(time)), "")
+            # The stamp of a header of ROS counts whole nanoseconds since 1970.
+            of_ros = meaning.rank == 0 and first.isdecimal() and len(first) >= 18
+            if of_ros and not meaning.unit:
                 result.clock_unit, result.bare_clock = "ns", False
                 self.meanings[time] = replace(meaning, unit="ns")
             return
@@ -266,11 +285,6 @@ class _Reader(NamedColumns):
         digits = {"ns": 9, "us": 6, "ms": 3}.get(self.meanings[part].unit, 0)
         parts = self._sampled(part)
         return whole and all(one.isdecimal() and int(one) < 10**digits for one in parts)
-
-    def _is_of_ros(self, time: int) -> bool:
-        """Whether the stamp of a header counts whole nanoseconds since 1970."""
-        first = next(iter(self._sampled(time)), "")
-        return first.isdecimal() and len(first) >= 18
 
     def _find_units(self) -> None:
         result = self.result

@@ -1,18 +1,167 @@
-"""Variables of MATLAB as tables: structs, vectors, matrices."""
+"""Variables of MATLAB files, of the old format and of the one that is HDF5, as tables.
+
+Structs, vectors, matrices.
+"""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError
+from driftwalk.core.errors import FormatError, damaged_as
 from driftwalk.record.column_names import column_meaning
-from driftwalk.record.stores.matlab import Opaque, Struct, Value
-from driftwalk.record.tables.cells import Values, objects
-from driftwalk.record.tables.in_memory import MemorySource
+from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
+from driftwalk.record.tables.in_memory import MemorySource, Values, objects
+from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, read_old, refuse_many
+
+_CLASS: Final = "MATLAB_class"
+
+
+@dataclass(frozen=True)
+class Struct:
+    """A struct, or an array of structs."""
+
+    elements: list[dict[str, Value]]
+    """The fields of each element."""
+
+
+@dataclass(frozen=True)
+class Opaque:
+    """An object that only MATLAB can read."""
+
+    kind: str
+    """Its class: table, timetable, datetime, string, ..."""
+
+
+Value = npt.NDArray[Any] | str | list[Any] | Struct | Opaque | None
+"""An array of numbers with two axes or more, a text, a cell array as a list, or none of these."""
+
+
+@contextmanager
+def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
+    """Return the variables of a file by their names.
+
+    Raises
+    ------
+    FormatError
+        When it is no file of MATLAB's, is damaged, or declares more than it can hold.
+    """
+    with path.open("rb") as file:
+        start = file.read(len(OLD))
+    if start == HDF5_BASED:
+        with opened_hdf5(path) as contents:
+            names = [str(name) for name in contents.file if not str(name).startswith("#")]
+            yield {name: _hdf5_value(contents, name) for name in names}
+    elif start == OLD:
+        with damaged_as("as a MATLAB file", path):
+            content = read_old(path)
+        inside = {  # the name of an opaque object
+            name: text_of(value["s0"].ravel()[0])
+            for name, value in content.items()
+            if _is_opaque(value)
+        }
+        yield {inside.get(name) or name: _old_value(value) for name, value in content.items()}
+    else:
+        raise FormatError("is no MATLAB file of version 5 or 7.3")
+
+
+def _is_opaque(value: Any) -> bool:
+    names = getattr(getattr(value, "dtype", None), "names", None)
+    return names is not None and {"s0", "s1", "s2"} <= set(names)
+
+
+def _old_value(value: Any) -> Value:
+    """Return a value of scipy's in the form that both formats share."""
+    if _is_opaque(value):
+        return Opaque(text_of(value["s2"].ravel()[0]))
+    if not isinstance(value, np.ndarray):
+        return None
+    if value.dtype.names is not None:
+        refuse_many(value.size)
+        fields = value.dtype.names
+        return Struct(
+            [{name: _old_value(one[name]) for name in fields} for one in value.ravel(order="F")]
+        )
+    if value.dtype.kind == "O":
+        refuse_many(value.size)
+        return [_old_value(one) for one in value.ravel(order="F")]
+    if value.dtype.kind == "U":
+        return _texts([str(row) for row in value.ravel()])
+    return value if value.dtype.kind in "fiub" else None
+
+
+def _hdf5_value(contents: Hdf5Contents, name: str) -> Value:
+    """Return an entry of an HDF5 file in the form that both formats share."""
+    import h5py
+
+    entry = contents.file[name]
+    kind = text_of(entry.attrs.get(_CLASS, b""))
+    if isinstance(entry, h5py.Group):
+        return _hdf5_struct(contents, entry) if kind in ("struct", "") else Opaque(kind)
+    if not isinstance(entry, h5py.Dataset):
+        return None
+    if "MATLAB_object_decode" in entry.attrs:
+        return Opaque(kind)
+    if "MATLAB_empty" in entry.attrs:
+        return np.empty((0, 0))
+    if entry.dtype.kind == "O":
+        return [_hdf5_value(contents, one) for one in _referred(contents, entry)]
+    if entry.dtype.kind not in "fiub":
+        return None
+    # Columns come first in MATLAB.
+    values = contents.array(name).T
+    if kind == "char":
+        return _texts(["".join(map(chr, row)) for row in np.atleast_2d(values).tolist()])
+    return values
+
+
+def _texts(rows: list[str]) -> Value:
+    """Return a matrix of letters as the text of its only row, or as one text a row."""
+    texts: list[Any] = [row.strip() for row in rows]
+    return texts if len(texts) > 1 else "".join(texts)
+
+
+def _hdf5_struct(contents: Hdf5Contents, group: Any) -> Struct:
+    """Return a struct; of an array of them each field holds references to the elements' values."""
+    import h5py
+
+    many: dict[str, list[str]] = {}
+    one: dict[str, Value] = {}
+    for field in map(str, group):
+        entry = group[field]
+        kind = text_of(entry.attrs.get(_CLASS, b""))
+        references = isinstance(entry, h5py.Dataset) and entry.dtype.kind == "O"
+        if references and kind != "cell":
+            many[field] = _referred(contents, entry)
+        else:
+            one[field] = _hdf5_value(contents, str(entry.name))
+    lengths = {len(names) for names in many.values()}
+    if not many:
+        return Struct([one])
+    if len(lengths) > 1:
+        raise FormatError(f"'{group.name}' has fields of different lengths")
+    return Struct(
+        [
+            {field: _hdf5_value(contents, names[at]) for field, names in many.items()}
+            for at in range(lengths.pop())
+        ]
+    )
+
+
+def _referred(contents: Hdf5Contents, entry: Any) -> list[str]:
+    """Return the names of the entries that a cell array refers to, in MATLAB's order."""
+    refuse_many(entry.size)
+    references = contents.array(str(entry.name)).T.ravel(order="F")
+    return [str(contents.file[reference].name) for reference in references]
+
 
 VECTORS: Final = "variables"
 """Name of the table that the vectors of a file make."""
@@ -60,9 +209,14 @@ def only_matlab(variables: dict[str, Value]) -> str:
     >>> only_matlab({"T": Opaque("table")}).split(":")[0]
     "'T' is a MATLAB table, which only MATLAB can read"
     """
-    found = [
-        (name, value.kind) for name, value in _with_fields(variables) if isinstance(value, Opaque)
-    ]
+    inner = {
+        f"{name}.{field}": one
+        for name, value in variables.items()
+        if isinstance(value, Struct) and value.elements
+        for field, one in value.elements[0].items()
+    }
+    everything = [*variables.items(), *inner.items()]
+    found = [(name, value.kind) for name, value in everything if isinstance(value, Opaque)]
     if not found:
         return ""
     name, kind = next((one for one in found if one[1] in _TABLES), found[0])
@@ -74,17 +228,6 @@ def only_matlab(variables: dict[str, Value]) -> str:
             f"S = table2struct({change}, 'ToScalar', true)"
         )
     return f"{what}: save {_SAVED.get(kind, 'it as numbers')} in its place"
-
-
-def _with_fields(variables: dict[str, Value]) -> list[tuple[str, Value]]:
-    """Return variables, and the fields of those that are structs."""
-    inner = [
-        (f"{name}.{field}", one)
-        for name, value in variables.items()
-        if isinstance(value, Struct) and value.elements
-        for field, one in value.elements[0].items()
-    ]
-    return [*variables.items(), *inner]
 
 
 def _table(value: Value, what: str) -> MemorySource | None:
@@ -116,7 +259,8 @@ def _of_fields(fields: dict[str, Value], what: str) -> MemorySource | None:
         if several and (meaning is None or meaning.quantity not in _OF_BODIES):
             continue
         for number, column in enumerate(_columns(value, rows), start=1):
-            names.append(_numbered(name, number) if several else name)
+            # The number follows the quantity, before a unit.
+            names.append(re.sub(r"^([A-Za-z]+)", rf"\g<1>{number}", name) if several else name)
             columns.append(column)
             matrices |= several
         _refuse_wide(len(columns), what)
@@ -161,17 +305,14 @@ def _columns(value: Value, rows: int) -> list[Values]:
     return [across[:, at] for at in range(across.shape[1])]
 
 
-def _numbered(name: str, number: int) -> str:
-    """Return the name of a body's column: the number follows the quantity, before a unit."""
-    return re.sub(r"^([A-Za-z]+)", rf"\g<1>{number}", name)
-
-
 def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
     """Return an array of structs as a table: a row each, or the rows of a body each."""
     if not elements:
         return None
     if all(_is_single(value) for element in elements for value in element.values()):
-        return _of_rows(elements, what)
+        names = list(elements[0])
+        columns = [objects([_single(one.get(name)) for one in elements]) for name in names]
+        return MemorySource(what, names, columns)
     parts = [_of_fields(element, what) for element in elements]
     known = [(at, part) for at, part in enumerate(parts, start=1) if part is not None]
     if not known:
@@ -185,12 +326,6 @@ def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | 
         np.concatenate([part.column(part.names.index(name)) for _, part in known]) for name in names
     ]
     return MemorySource(what, [*names, _BODY], [*columns, np.concatenate(bodies)])
-
-
-def _of_rows(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
-    names = list(elements[0])
-    columns = [objects([_single(one.get(name)) for one in elements]) for name in names]
-    return MemorySource(what, names, columns)
 
 
 def _is_single(value: Value) -> bool:

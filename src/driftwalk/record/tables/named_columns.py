@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final, NamedTuple
+from dataclasses import dataclass, field
+from typing import Final
 
 from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import ColumnMeaning, column_meaning, unit_of_name
 from driftwalk.record.raw import ReadOptions
-from driftwalk.record.tables.column_reading import ColumnReading, TableReading
+from driftwalk.record.tables.boxes import Box
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.vocabulary import (
     ALLOWED,
@@ -20,6 +21,66 @@ from driftwalk.record.vocabulary import (
     UNITS,
     VARIANTS,
 )
+
+_WORDS: Final = {"t": "time", "t+": "fraction of the time", "frame": "frame number", "w": "width"}
+_WORDS_MORE: Final = {"h": "height", "theta": "orientation", "body": "name of the body"}
+
+
+@dataclass
+class ColumnReading:
+    """Reading of one column: what it was taken for, in which unit, and why."""
+
+    name: str
+    role: str = ""
+    """A quantity of `ALLOWED`, ``"t+"``, or ``""``: it is not read."""
+    body: str = ""
+    unit: str = ""
+    """Of `UNITS`; ``""`` where nothing names it."""
+    why: str = "its name is not known"
+
+    def described(self) -> dict[str, str]:
+        """Return the reading for people."""
+        words = {**_WORDS, **_WORDS_MORE}.get(self.role, self.role)
+        meaning = f"{words} of '{self.body}'" if self.body and words else words
+        return {
+            "column": self.name,
+            "meaning": meaning or "not read",
+            "unit": self.unit,
+            "why": self.why,
+        }
+
+
+@dataclass
+class TableReading:
+    """Reading of the columns (from 0) of a table, as the reader executes it."""
+
+    columns: list[ColumnReading]
+    bodies: dict[str, dict[str, int]] = field(default_factory=dict)
+    """Body to quantity (x, y, theta, ..., sides of a box) to column."""
+    numbers: tuple[int, ...] = ()
+    """The clock: one column of numbers, or seconds and their fraction; empty: none, or stamps."""
+    stamps: tuple[int, ...] = ()
+    """The clock: time stamps, or dates and times of day."""
+    clock_unit: str = "frame"
+    bare_clock: bool = False
+    """Whether the clock has times of an unnamed unit."""
+    body_column: int | None = None
+    length_unit: str = ""
+    factors: dict[int, float] = field(default_factory=dict)
+    """Columns of positions in another unit than that, and what makes it of them."""
+    angle_unit: str = ""
+    bare: bool = True
+    """Whether the names of positions are plain symbols, which mean metres next to seconds."""
+    box: Box | None = None
+    parts: tuple[str, str, str] | None = None
+    """Bodies that are parts of one: its middle, and those from and to which it points."""
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def clock(self) -> int | None:
+        """The column whose values are the clock's once the table is read."""
+        return next(iter((*self.stamps, *self.numbers)), None)
+
 
 _SKIP: Final = "skip"
 LEFT_OUT: Final = "you left it out"
@@ -118,10 +179,13 @@ class NamedColumns:
         """Leave out pairs that are not a body, or repeat one, where there is another pair."""
         ys, thetas = self.bodies_with("y"), self.bodies_with("theta")
         bodies = [body for body in self.bodies_with("x") if body in ys]
-        kinds = {one.body: _kinds(one.body) for one in self.meanings.values()}
-        real = [body for body in bodies if not any(kinds[body])]
-        setpoints = [body for body in bodies if kinds[body].setpoint]
-        variants = [body for body in bodies if kinds[body] == (False, True)]
+        words = {
+            one.body: {word.lower().rstrip("0123456789") for word in one.body.split("_")}
+            for one in self.meanings.values()
+        }
+        setpoints = [body for body in bodies if words[body] & SETPOINTS]
+        variants = [body for body in bodies if words[body] & VARIANTS and body not in setpoints]
+        real = [body for body in bodies if body not in (*setpoints, *variants)]
         left: dict[str, str] = {}
         if real or variants or self.result.box is not None:
             left = dict.fromkeys(setpoints, _OTHER_BODY)
@@ -133,11 +197,11 @@ class NamedColumns:
                 "there is no other pair of x and y"
             )
         left |= self._computed(variants, real)
-        for body, kind in kinds.items():
+        for body in [one for one in words if one not in bodies]:
             # An angle of a setpoint stands alone where its position has other names.
-            if kind.setpoint and body not in bodies:
+            if words[body] & SETPOINTS:
                 left[body] = _OTHER_BODY
-            if kind.variant and body not in bodies and _base(body) in thetas:
+            if words[body] & VARIANTS and _base(body) in thetas:
                 left[body] = _SAME_BODY
         for at, meaning in list(self.meanings.items()):
             if meaning.body in left:
@@ -211,11 +275,10 @@ class NamedColumns:
             raise InputError(self.no_unit(at, meaning.unknown))
         if stated or self.lenient:
             return
-        bodies = self.bodies_with("y")
+        bodies = {"x": self.bodies_with("y"), "lon": self.bodies_with("lat")}
+        bodies |= {"y": bodies["x"], "lat": bodies["lon"]}
         pairs = {
-            at: one
-            for at, one in self.meanings.items()
-            if one.quantity in ("x", "y") and one.body in bodies
+            at: one for at, one in self.meanings.items() if one.body in bodies.get(one.quantity, ())
         }
         words = {one.ending for one in pairs.values()}
         word = next(iter(words)) if len(words) == 1 else ""
@@ -241,18 +304,6 @@ class NamedColumns:
             f"columns '{self.names[first]}' and '{self.names[second]}' could both be "
             f"{quantity}: name one with {argument_text('columns', {quantity: 'NAME'})}"
         )
-
-
-class _Kinds(NamedTuple):
-    """Whether the name of a body has words of a setpoint, and of a computation."""
-
-    setpoint: bool
-    variant: bool
-
-
-def _kinds(body: str) -> _Kinds:
-    words = {word.lower().rstrip("0123456789") for word in body.split("_")}
-    return _Kinds(bool(words & SETPOINTS), bool(words & VARIANTS))
 
 
 def _base(body: str) -> str:

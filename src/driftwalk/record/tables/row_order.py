@@ -13,11 +13,10 @@ import numpy as np
 from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import argument_text
 from driftwalk.record.bad_row import is_number
-from driftwalk.record.cleaning.several_bodies import LARGEST_SHARE
+from driftwalk.record.cleaning.several_bodies import LARGEST_SHARE, order_in_frame
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import MISSING, Array, TableLayout
-from driftwalk.record.tables.column_reading import TableReading
-from driftwalk.record.tables.named_columns import LEFT_OUT
+from driftwalk.record.tables.named_columns import LEFT_OUT, TableReading
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.text import Table
 from driftwalk.record.vocabulary import ALLOWED, UNITS
@@ -79,11 +78,17 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
         own = [at for at in free if len(table.labels[at]) >= _ORDER.own * table.rows]
         for at in own:
             if at in counters and _skips_rows(counters[at]):
-                return _counts_up(names[at])
-    apart = _tracks(table, counters, free, reading.body_column)
+                frame, time = (
+                    argument_text("columns", {what: names[at]}) for what in ("frame", "t")
+                )
+                return (
+                    f"no column is known to hold times or frames, but '{names[at]}' counts up and "
+                    f"skips some: add {frame} if it counts frames, {time} if it holds times"
+                )
+    apart = _tracks(table, counters, free, reading.body_column, (x, y))
     if apart is not None:
-        body, frame = apart
-        what, columns = f"'{names[frame]}' counts frames", {"frame": names[frame]}
+        body, counter = apart
+        what, columns = f"'{names[counter]}' counts frames", {"frame": names[counter]}
         if body is not None and body != reading.body_column:
             what += f" and '{names[body]}' names bodies"
             columns["body"] = names[body]
@@ -93,21 +98,13 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
         )
     if reading.body_column is None:
         for at in free:
-            if _leaps(table, at, x, y):
+            if _leaps(table.codes[at], table.numbers[x], table.numbers[y]):
                 add, skip = (argument_text("columns", {one: names[at]}) for one in ("body", "skip"))
                 return (
                     f"rows seem to be of several bodies, or runs, which '{names[at]}' names: add "
                     f"{add} if so, {skip} if it is one body, whose rows are its frames"
                 )
     return None
-
-
-def _counts_up(name: str) -> str:
-    frame, time = (argument_text("columns", {what: name}) for what in ("frame", "t"))
-    return (
-        f"no column is known to hold times or frames, but '{name}' counts up and skips some: "
-        f"add {frame} if it counts frames, {time} if it holds times"
-    )
 
 
 def _position(reading: TableReading) -> tuple[int, int]:
@@ -141,7 +138,11 @@ def _skips_rows(values: Array) -> bool:
 
 
 def _tracks(
-    table: Table, counters: dict[int, Array], free: list[int], body: int | None
+    table: Table,
+    counters: dict[int, Array],
+    free: list[int],
+    body: int | None,
+    place: tuple[int, int],
 ) -> tuple[int | None, int] | None:
     """Return the columns of body and frame of a table whose frames repeat or start over."""
     found: list[tuple[int, int | None, int]] = []
@@ -155,8 +156,12 @@ def _tracks(
             few = (2 if body is None else 1) <= bodies <= table.rows // 2
             if few and other != frame and _counts_each(table.codes[other], values, body):
                 found.append((bodies, other, frame))
-        if not found and body is None and _starts_over(values):
-            found.append((table.rows, None, frame))
+        if not found and body is None:
+            repeated = (np.diff(values) >= 0).all() and _leaps(
+                order_in_frame(values), *(table.numbers[at] for at in place)
+            )
+            if repeated or _starts_over(values):
+                found.append((table.rows, None, frame))
     return min(found, key=lambda entry: entry[0])[1:] if found else None
 
 
@@ -182,12 +187,11 @@ def _starts_over(values: Array) -> bool:
     return bool(back.any() and (steps[~back] == 1.0).mean() > _ORDER.own and back.mean() < 0.1)
 
 
-def _leaps(table: Table, column: int, x: int, y: int) -> bool:
-    """Whether a column tells bodies, or runs, apart: the position leaps wherever it changes."""
-    codes = table.codes[column]
-    labels = len(table.labels[column])
+def _leaps(codes: Codes, x: Array, y: Array) -> bool:
+    """Whether codes tell bodies, or runs, apart: the position leaps wherever they change."""
+    labels = int(codes.max(initial=-1)) + 1
     changes = codes[1:] != codes[:-1]
-    if labels < 2 or labels > table.rows // 4 or not changes.any():
+    if labels < 2 or labels > codes.size // 4 or not changes.any():
         return False
     counts = np.bincount(codes)
     turns = np.arange(codes.size) % labels
@@ -195,8 +199,8 @@ def _leaps(table: Table, column: int, x: int, y: int) -> bool:
         return True  # as many rows of each, one after the other or in turns
     order = np.argsort(codes, kind="stable")
     same = codes[order][1:] == codes[order][:-1]
-    within = np.hypot(*(np.diff(table.numbers[axis][order])[same] for axis in (x, y)))
-    leaps = np.hypot(*(np.diff(table.numbers[axis])[changes] for axis in (x, y)))
+    within = np.hypot(*(np.diff(axis[order])[same] for axis in (x, y)))
+    leaps = np.hypot(*(np.diff(axis)[changes] for axis in (x, y)))
     within = within[np.isfinite(within) & (within > 0)]
     leaps = leaps[np.isfinite(leaps)]
     if not within.size or not leaps.size:
@@ -234,8 +238,13 @@ def body_columns(
     x_column, y_column = _position(reading)
     numbers = {x_column, y_column, *reading.numbers[:1]}
     taken = {*numbers, *reading.numbers, *reading.stamps, reading.body_column}
+    # "min" next to "sec" names no body, and neither does a column of another known meaning.
     free = tuple(
-        index for index, name in enumerate(names) if index not in taken and _may_be_a_name(name)
+        index
+        for index, name in enumerate(names)
+        if index not in taken
+        and UNITS.get(name.strip().lower()) not in ALLOWED["t"]
+        and ((meaning := column_meaning(name)) is None or meaning.quantity == "body")
     )
     # The first rows tell the columns of measurements, which have another value in every row.
     wanted = TableLayout(
@@ -252,13 +261,6 @@ def body_columns(
         and _tells_apart(table.codes[index], times, x, y, in_order=in_order)
     }
     return [names[index] for index in sorted(found, key=lambda index: found[index])[:3]]
-
-
-def _may_be_a_name(column: str) -> bool:
-    if UNITS.get(column.strip().lower()) in ALLOWED["t"]:
-        return False  # "min" next to "sec"
-    meaning = column_meaning(column)
-    return meaning is None or meaning.quantity == "body"
 
 
 def _are_names(labels: list[str], *, rows: int) -> bool:

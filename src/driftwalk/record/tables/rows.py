@@ -25,8 +25,8 @@ from driftwalk.record.raw import (
 )
 from driftwalk.record.space import Plane, body_in_plane, on_the_ground, plane_of_columns
 from driftwalk.record.tables.boxes import box_angle, box_centre
-from driftwalk.record.tables.column_reading import TableReading
 from driftwalk.record.tables.columns import read_columns
+from driftwalk.record.tables.named_columns import TableReading
 from driftwalk.record.tables.row_order import body_columns, other_order
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import DAY, count_days
@@ -70,7 +70,12 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
     reading, planes = columns_of(source, options)
     labels = [column.name for column in reading.columns]
     if reading.clock is None:
-        _require_rows_are_frames(source, reading, labels, options)
+        found = other_order(source, reading, labels)
+        if found is not None:
+            raise source.error(found)
+        if options.frame_rate_hz is None:
+            scale = scale_wanted(reading.length_unit, bare_is_si=False, options=options)
+            raise source.error(NAME_THE_CLOCK + (f"; {scale}" if scale else ""))
     table = _read(source, reading, labels)
     clock = _clock(table, reading)
     notes = [*reading.notes, *_unread_angles(reading)]
@@ -153,21 +158,19 @@ def _detector_advice(source: TableSource) -> str:
         return ""
     width = rows.shape[1] if rows.ndim == 2 else 0
     if width in (9, 10) and not (rows[:, :2] % 1.0).any() and (rows[:, 4:6] > 0.0).all():
-        named = dict(
-            zip(("frame", "body", "x", "y", "w", "h", "confidence"), "1234567", strict=True)
-        )
-        return (
-            "; if they are those of MOT (frame, identity, left, top, width, height, confidence), "
-            f'{argument_text("columns", named)} and `box="xywh"`'
-        )
-    shares = width in (5, 6, 7) and bool(((rows[:, 1:5] >= 0.0) & (rows[:, 1:5] <= 1.0)).all())
-    if shares and not (rows[:, 0] % 1.0).any():
-        named = dict(zip(("x", "y", "w", "h"), "2345", strict=True))
-        return (
-            "; if they are those of YOLO (class, centre and size as shares of the image), "
-            f'{argument_text("columns", named)} and `box="cxcywh@1920x1080"`, its size in pixels'
-        )
-    return ""
+        program = "MOT (frame, identity, left, top, width, height, confidence)"
+        names, first, box = "frame body x y w h confidence", 1, "xywh"
+    elif (
+        width in (5, 6, 7)
+        and ((rows[:, 1:5] >= 0.0) & (rows[:, 1:5] <= 1.0)).all()
+        and not (rows[:, 0] % 1.0).any()
+    ):
+        program = "YOLO (class, centre, size as shares of the image; state its pixels)"
+        names, first, box = "x y w h", 2, "cxcywh@1920x1080"
+    else:
+        return ""
+    named = {name: str(at) for at, name in enumerate(names.split(), start=first)}
+    return f'; if they are those of {program}, {argument_text("columns", named)} and `box="{box}"`'
 
 
 def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Table:
@@ -224,18 +227,6 @@ def _clock(table: Table, reading: TableReading) -> Array:
         clock = (clock - origin) * unit + table.numbers[part] * ticks
         table.clock_origin = int((table.clock_origin + int(origin)) * unit)
     return clock
-
-
-def _require_rows_are_frames(
-    source: TableSource, reading: TableReading, labels: list[str], options: ReadOptions
-) -> None:
-    """Refuse a table without a known clock whose rows cannot, or need not, be frames."""
-    found = other_order(source, reading, labels)
-    if found is not None:
-        raise source.error(found)
-    if options.frame_rate_hz is None:
-        scale = scale_wanted(reading.length_unit, bare_is_si=False, options=options)
-        raise source.error(NAME_THE_CLOCK + (f"; {scale}" if scale else ""))
 
 
 def _unread_angles(reading: TableReading) -> list[str]:
@@ -379,8 +370,14 @@ def the_one_that_fits(
     """
     if not tables:
         raise FormatError(f"has no {what} that is a table")
-    if options.sheet is not None:
-        return _named(tables, options.sheet, what)
+    wanted = options.sheet
+    if wanted is not None:
+        number = int(wanted) if wanted.isdecimal() and wanted not in tables else 0
+        if wanted not in tables and not 1 <= number <= len(tables):
+            raise FormatError(
+                f"{argument_text('sheet', wanted)}: no such {what}; it has {listed(list(tables))}"
+            )
+        return [*tables.values()][number - 1] if number else tables[wanted]
     if len(tables) == 1:
         return next(iter(tables.values()))
     fitting: list[str] = []
@@ -401,13 +398,3 @@ def the_one_that_fits(
             f"has no {what} with positions among {listed(list(tables))}; {reasons[0]}"
         )
     return tables[fitting[0]]
-
-
-def _named(tables: Mapping[str, TableSource], wanted: str, what: str) -> TableSource:
-    if wanted in tables:
-        return tables[wanted]
-    if wanted.isdecimal() and 1 <= int(wanted) <= len(tables):
-        return list(tables.values())[int(wanted) - 1]
-    raise FormatError(
-        f"{argument_text('sheet', wanted)}: no such {what}; it has {listed(list(tables))}"
-    )

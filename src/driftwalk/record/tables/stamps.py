@@ -216,7 +216,10 @@ def _nanoseconds(texts: Texts, match: re.Match[str], rows: Integers) -> Ticks:
     if "half" in match.re.groupindex:
         wrong |= (hour < 1) | (hour > 12)
         hour = hour % 12 + (12 if match["half"] in "Pp" else 0)
-    ticks = _fraction(letters, match) + SECOND_NS * (second + 60 * (minute + 60 * hour))
+    ticks = SECOND_NS * (second + 60 * (minute + 60 * hour))
+    if match.groupdict().get("fraction") is not None:  # decimals beyond nine are left out
+        for weight, place in enumerate(range(*match.span("fraction"))[:9]):
+            ticks += 10 ** (8 - weight) * (letters[:, place] - np.int64(ord("0")))
     if _kind(match) == MOMENT:
         days, no_day = _days(part("year"), part("month"), part("day"))
         offset = 60 * (part("zone_minute") + 60 * part("zone_hour"))
@@ -228,15 +231,6 @@ def _nanoseconds(texts: Texts, match: re.Match[str], rows: Integers) -> Ticks:
     if wrong.any():
         at = int(np.argmax(wrong))
         raise StampError(int(rows[at]), f"'{texts[at].decode()}' is not a valid date and time")
-    return ticks
-
-
-def _fraction(letters: npt.NDArray[np.uint8], match: re.Match[str]) -> Ticks:
-    """Return the decimals of the seconds in nanoseconds; those beyond nine are left out."""
-    ticks = np.zeros(len(letters), dtype=np.int64)
-    if match.groupdict().get("fraction") is not None:
-        for weight, place in enumerate(range(*match.span("fraction"))[:9]):
-            ticks += 10 ** (8 - weight) * (letters[:, place] - np.int64(ord("0")))
     return ticks
 
 

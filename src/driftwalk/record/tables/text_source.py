@@ -18,15 +18,18 @@ from driftwalk.record.text_head import detect_delimiter, read_header
 
 
 class TextSource:
-    """A table in a text file."""
+    """A table in a text file, whose header is found or, by a layout, known."""
 
-    def __init__(self, path: Path, options: ReadOptions) -> None:
-        self._path = path
+    def __init__(self, path: Path, options: ReadOptions, layout: TableLayout | None = None) -> None:
+        self._path, self._advice = path, ""
+        self.units: list[str] = []
+        if layout is not None:
+            self.names, self._delimiter = layout.names, layout.delimiter
+            self._skip, self.has_header = layout.skip_lines, True
+            return
         self.names, self._delimiter, self._skip, self.has_header = read_header(
             path, delimiter=options.delimiter, header_line=options.header_line
         )
-        self.units: list[str] = []
-        self._advice = ""
         if self.has_header:
             # A line that is no text is refused when the table is read.
             with contextlib.suppress(FormatError):
@@ -49,11 +52,11 @@ class TextSource:
             here = self._delimiter if not at else None
             delimiter = options.delimiter or here or detect_delimiter(lines[at : at + 2])
             below_at = [n for n in range(at + 1, len(lines)) if lines[n].strip()][:2]
-            texts = [line.lstrip("# "), *(lines[n] for n in below_at)]
+            texts = [line.lstrip("# ").removeprefix("% "), *(lines[n] for n in below_at)]
             rows = [split_fields(one, delimiter) for one in texts]
             found = heading_of(rows, options)
             if found is not None:
-                if at or found.rows > 1:
+                if at or found.rows > 1 or line.startswith("% "):
                     self.names, self.units, self._delimiter = found.names, found.units, delimiter
                     self._skip = begin + [at, *below_at][found.rows - 1] + 1
                 # LabVIEW names a last column "Comment" and leaves it out.
@@ -96,5 +99,5 @@ class TextSource:
 
     def error(self, message: str) -> FormatError:
         """Return an error about the header, or the file where it has none."""
-        line = self._skip if self.has_header else None
+        line = (self._skip or None) if self.has_header else None
         return FormatError(message + self._advice, line=line)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from driftwalk.core.intervals import proportion_interval
 from driftwalk.schema.answers.parts import Answer, Part, Row, Table, each
 from driftwalk.schema.shapes import short_class
 
@@ -62,17 +63,9 @@ def mode_table(policy: xr.Dataset) -> Table:
     rows = []
     for one in each(policy, "mode"):
         share = float(one["constant_reached"])
-        low, high = exact_interval(share, count, confidence)
+        low, high = proportion_interval(round(share * count), count, confidence=confidence)
         rows.append([str(one["mode"].values), f"{share:.3f}", f"{low:.3f} to {high:.3f}"])
     return Table(rows, ["mode", "reaches it alone", f"{confidence:.0%} interval"])
-
-
-def exact_interval(share: float, worlds: int, confidence: float) -> tuple[float, float]:
-    """Return the Clopper-Pearson interval of a share of the worlds."""
-    from scipy.stats import binomtest
-
-    found = binomtest(round(share * worlds), worlds).proportion_ci(confidence)
-    return float(found.low), float(found.high)
 
 
 def trial_answer(found: xr.Dataset) -> Answer:

@@ -266,12 +266,14 @@ def with_verdict(fit: xr.Dataset, check: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         The `fit`, with ``verdict``, ``verdict_reason`` (sentences), ``p_value`` by criterion and
-        the residuals by cell. A warning that is a reason of the verdict is left out.
+        the residuals by cell. A warning that is a reason of the verdict is left out, and a misfit
+        that is surely there but too small to matter is a warning.
     """
     kept = check[["verdict", "verdict_reason", "p_value", *BY_CELL]].rename(PLACES)
     rest = [
         text for text in sentences(fit, "warning") if text not in sentences(check, "verdict_reason")
     ]
+    rest += [text for text in sentences(check, "note") if text not in rest]
     fit = fit.drop_vars("warning").assign_coords(warning=("warning", texts(rest)))
     found = fit.merge(kept, combine_attrs="override", compat="override", join="outer")
     found["residual_cell_size"] = ((), check.attrs["cell_size_m"])

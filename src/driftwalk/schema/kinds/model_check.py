@@ -29,6 +29,7 @@ kind: model_check
 version: 3
 dimensions:
     verdict_reason: sentences
+    note: sentences
     criterion: criteria, by name
     component: errors in x, in y, and in the angle where it is in the state
     lag: samples
@@ -85,6 +86,8 @@ variables:
     part_end(part) [s]: end of the part
     speed_low(speed_range) [m s-1]: lower end of the range
     speed_high(speed_range) [m s-1]: upper end of the range
+variables (a misfit is surely there, but too small to matter):
+    note(note) text: the misfit, in a sentence
 variables ({_COMPARED}):
     ks_to_estimate(replicate) [1]: KS distance of the recording to replicates at the estimate
     ks_floor(pair) [1]: KS distance of two replicates

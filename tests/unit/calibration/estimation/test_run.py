@@ -136,11 +136,14 @@ def test_a_model_that_ignores_its_parameters_is_refused() -> None:
         calibrate(recording, model, study=chosen, threads=1)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_summaries_like_the_models_own_count_however_close_a_search_comes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """No end of a descent matches, so a search is made; no score is close enough to its own."""
+    """No end of a descent matches, so a search is made; no score is close enough to its own.
+
+    In every run: summaries that count without a search, and a search that none of them follows.
+    """
     strict = MATCHING._replace(matches=0.0, as_close=0.0)
     monkeypatch.setattr(matching, "MATCHING", strict)
     monkeypatch.setattr(run, "MATCHING", strict)

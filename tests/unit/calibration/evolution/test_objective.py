@@ -97,6 +97,9 @@ def test_ranges_follow_the_scales_of_the_recording():
     assert found["run_time"].high == pytest.approx(60.0)
     assert found["wall_range"].high == pytest.approx(SCALES.size)
     assert found["stroke_frequency"].high == pytest.approx(10.0)
+    # A body that only slides along the wall has to be near the range: in ten minutes a rate of
+    # 0.2 rad/s takes it off the wall several times as fast as its diffusion does.
+    assert found["wall_turn"].low == pytest.approx(1.0 / 60.0)
     # A number without a unit keeps its range.
     assert (found["speed_cv"].low, found["speed_cv"].high) == (0.01, 2.0)
 

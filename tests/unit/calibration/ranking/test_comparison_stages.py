@@ -22,21 +22,23 @@ from driftwalk.calibration.ranking.model_evidence import Evidence, Shortlist
         (1, {3}, [3]),
         (1, {0}, [3, 0]),
         (3, {3, 0}, [3, 0, 2]),
+        # The third has fewer numbers than the one that gives the summaries.
+        (1, {1}, [1, 2]),
     ],
 )
 def test_others_than_those_that_tie_are_asked_until_one_gives_the_summaries(
     tied: int, giving: set[int], wanted: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    order, numbers = ((3, 0, 2), [5] * 4) if wanted[0] == 3 else ((1, 0, 2), [7, 6, 5, 5])
+
     def answer(entry: int, *_: Any, **__: Any) -> Evidence:
         return Evidence(100.0 if entry in giving else 500.0, 90.0, 140.0, 0.0)
 
-    monkeypatch.setattr(
-        comparison_stages, "shortlist_models", lambda *_: Shortlist((3, 0, 2), tied)
-    )
+    monkeypatch.setattr(comparison_stages, "shortlist_models", lambda *_: Shortlist(order, tied))
     monkeypatch.setattr(comparison_stages, "most_settings", lambda *_: 4)
     monkeypatch.setattr(Stages, "_matched", lambda _, number, index, point, before: answer(index))
-    entry = SimpleNamespace(ranges=("a",), baseline=False)
-    work: Any = SimpleNamespace(entries=[entry] * 4, costs=lambda: [1] * 4)
+    entries = [SimpleNamespace(ranges=("a",), baseline=False, numbers=k) for k in numbers]
+    work: Any = SimpleNamespace(entries=entries, costs=lambda: [1] * 4)
     judged: Any = [SimpleNamespace(point=np.zeros(1))] * 4
     made = Stages(work, 20, in_memory, None, lambda *_: None)
     assert list(made.evidence(judged)) == wanted

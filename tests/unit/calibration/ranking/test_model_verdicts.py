@@ -179,9 +179,9 @@ def test_the_answer_is_one_sentence(words: str, first: int, sentence: str) -> No
 def test_of_models_that_are_as_likely_none_is_rejected_for_its_distance() -> None:
     """Ten blocks of a short recording may prefer the simpler one by two standard errors.
 
-    Which of them it is stays open, unless the simpler one is the likelier, too.
+    Which of them it is stays open, unless the other one is likelier by no more than chance.
     """
-    evidence = {0: TYPICAL, 1: TYPICAL._replace(deviance=-408.0)}
+    evidence = {0: TYPICAL, 1: TYPICAL._replace(deviance=-415.0)}
     scores = [scored(1.0), scored(1.1)]
     names = ["active", "run_tumble"]
     found = verdicts_of(names, evidence, scores=scores)
@@ -191,16 +191,16 @@ def test_of_models_that_are_as_likely_none_is_rejected_for_its_distance() -> Non
     answer = rank_by_evidence(entries, evidence)
     assert answer.best == 0
     assert answer.as_good(entries, evidence) == [1]
-    less_likely = {0: TYPICAL, 1: TYPICAL._replace(deviance=-395.0)}
+    less_likely = {0: TYPICAL, 1: TYPICAL._replace(deviance=-405.0)}
     assert rank_by_evidence(entries, less_likely).as_good(entries, less_likely) == []
     found = verdicts_of(names, less_likely, scores=scores)
     assert [one.word for one in found] == [EXPLAINS] * 2
 
 
 def test_bouts_of_another_law_are_against_a_model_that_gives_the_summaries() -> None:
-    for distance, longest, word in (
-        (0.31, 5.0, DOES_NOT_EXPLAIN), (0.13, 13.0, DOES_NOT_EXPLAIN), (0.13, 5.0, EXPLAINS),
+    for distance, tail, word in (
+        (0.31, 0.2, DOES_NOT_EXPLAIN), (0.13, 0.4, DOES_NOT_EXPLAIN), (0.13, 0.2, EXPLAINS),
     ):  # fmt: skip
-        bouts = (BoutDistance("slow", distance, 0.14, longest, 12.0),)
+        bouts = (BoutDistance("slow", distance, 0.14, tail, 0.3),)
         (found,) = verdicts_of(["active"], {0: TYPICAL._replace(bouts=bouts)})
         assert found.word == word

@@ -62,8 +62,9 @@ def failed(check: xr.Dataset) -> set[str]:
     return set(check["criterion"].values[check["failed"].values == 1])
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_growing_flow_that_was_not_fitted_fails(growing: xr.Dataset) -> None:
+    """In every run: a flow that is switched, in tests/integration/cli/test_fit_switching.py."""
     check = dw.check_model(dw.fit_motion(growing, study("constant")), growing)
     assert check["verdict"] == "does not explain"
     assert failed(check) & {"flow strength", "change"}

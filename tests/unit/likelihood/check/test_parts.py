@@ -10,10 +10,16 @@ from scipy.stats import chi2
 
 from driftwalk.comparison import ks_distance
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.check.criteria import motion_criterion
+from driftwalk.likelihood.check.criteria import (
+    motion_criterion,
+    noise_criterion,
+    strength_criterion,
+)
 from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, velocity_at
 from driftwalk.likelihood.check.place import (
     Layout,
+    Spread,
+    Trend,
     cell_of,
     groups_of,
     lay_out,
@@ -380,3 +386,34 @@ def test_sums_of_means_over_samples_are_those_of_all() -> None:
     assert means.score == pytest.approx(whole.score)
     assert means.power == pytest.approx(whole.power)
     assert means.slope == pytest.approx(whole.slope)
+
+
+@pytest.mark.parametrize("largest", [0.004, 0.05])
+def test_a_change_of_the_flow_that_is_sure_but_small_is_a_note(largest: float) -> None:
+    """Nine parts of ten are steady to 0.1 %; the other one is off, by many standard deviations."""
+    change, std = np.zeros(10), np.full(10, 5e-4)
+    change[3] = largest
+    seen = np.ones(10, dtype=bool)
+    found = strength_criterion(
+        Trend(change, std, float(((change / std) ** 2).sum()), 9, seen), ten_parts()
+    )
+    assert found.p_value == pytest.approx(chi2.sf((largest / 5e-4) ** 2, 9))
+    small = largest < 0.02
+    assert found.failed is not small
+    assert (found.note or "").startswith("surely there, but too small to matter") is small
+    assert "between 180 s and 240 s it is" in found.sentence
+
+
+def test_noise_that_differs_surely_but_little_is_a_note() -> None:
+    """Ten equal parts of 60,000 errors each: the mean of all has a standard error of 0.2 %."""
+    share, std = np.full(10, 0.1), np.full(10, 2e-3)
+    ratio = 1.0 + 0.03 * np.array([1, -1, *[0] * 8])
+    found = noise_criterion(Spread(ratio, std, share), ten_parts(), by="time")
+    # A fifth of the parts is off by 3 %, so the root mean square of sigma_F by 0.67 %.
+    assert found.size == pytest.approx(0.5 * np.sqrt(0.2 * 0.03**2 - 2e-3**2))
+    assert found.note is not None
+    worse = noise_criterion(Spread(1.0 + 5 * (ratio - 1.0), std, share), ten_parts(), by="time")
+    assert worse.failed
+    assert worse.note is None
+    nothing = noise_criterion(Spread(np.ones(10), std, share), ten_parts(), by="time")
+    assert nothing.note is None

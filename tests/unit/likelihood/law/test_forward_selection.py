@@ -75,7 +75,7 @@ def test_where_no_group_can_be_opened_all_are_closed() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("settled_by", [10.0, math.inf])
+@pytest.mark.parametrize("settled_by", [pytest.param(10.0, marks=pytest.mark.study), math.inf])
 def test_a_law_that_was_found_amid_departures_is_compared_again(settled_by: float) -> None:
     """A block under the paper's law, taken for a floating one with a linear part of the drag.
 

@@ -102,7 +102,7 @@ def test_an_angle_wins_over_a_quaternion_and_z_is_not_read_unasked(tmp_path: Pat
         ("t,x,y,z_mm\n0,1,2,3\n", {"up": "z"}, "name different units"),
         ("t,x,y\n0,1,2\n", {"header_line": 2}, "no rows of data below line 2"),
         ("t,x,y\n0,1,2\n", {"header_line": 9}, "no rows of data below line 9"),
-        ("t,x,y\n0,1,2\n", {"topic": "/a"}, "no ROS bag: leave `topic` out"),
+        ("t,x,y\n0,1,2\n", {"topic": "/a"}, "`topic` is for ROS bags"),
     ],
 )
 def test_what_is_refused(tmp_path: Path, text: str, options: Any, message: str) -> None:

@@ -95,7 +95,7 @@ def test_markers(tmp_path: Path) -> None:
     ("old", "new", "message"),
     [
         ("Objects", "Devices", "line 1: begins with the section 'Devices': export Objects"),
-        ("\n10\n", "\nfast\n", "line 2: expected the frame rate, got 'fast'"),
+        ("\n10\n", "\nfast\n", "line 2: the frame rate is 'fast', and no rate of frames"),
         ("TX", "Tx", "'Block' has no columns TX, TY, TZ"),
         ("mm,mm,mm", "mm,m,mm", "units of the positions are m, mm"),
         ("mm", "furlong", "units of the positions are furlong"),

@@ -229,3 +229,38 @@ def test_a_name_without_a_column_at_the_end(tmp_path: Path, between: str) -> Non
     above = "LabVIEW Measurement\t\nOperator\tme\n\n"
     path.write_text(f"{above}Time\tx\ty\tComment\n{between}{rows}")
     check(load(path))
+
+
+@pytest.mark.parametrize("above", ["", "% made by a program\n"])
+def test_a_header_behind_a_percent_sign_and_a_blank(tmp_path: Path, above: str) -> None:
+    rows = [f"{t} {x} {y}" for t, x, y in zip(T, X, Y, strict=True)]
+    path = tmp_path / "lab.txt"
+    path.write_text("\n".join([f"{above}% t_s x_m y_m", *rows, ""]))
+    check(load(path))
+
+
+@pytest.mark.parametrize("form", ["dir_{}", "rot_{}", "Euler.{}"])
+def test_directions_are_no_body(tmp_path: Path, form: str) -> None:
+    other = {form.format("x"): 0.6 + 0 * X, form.format("y"): 0.8 + 0 * X}
+    check(load(columns(tmp_path, {"t": T, "x": X, "y": Y, **other})))
+
+
+def test_a_rotation_of_four_parts_is_an_orientation(tmp_path: Path) -> None:
+    parts = zip("xyzw", (0 * T, 0 * T, np.sin(ANGLE / 2), np.cos(ANGLE / 2)), strict=True)
+    turns = {f"rotation.{axis}": values for axis, values in parts}
+    dataset = load(columns(tmp_path, {"t": T, "x": X, "y": Y, **turns}))
+    np.testing.assert_allclose(np.unwrap(dataset.theta.values[:, 0]), ANGLE, atol=1e-12)
+
+
+def test_longitudes_in_radians_are_refused(tmp_path: Path) -> None:
+    path = columns(tmp_path, {"t": T, "lon_rad": 0.2 + 1e-8 * X, "lat_rad": 0.8 + 1e-8 * Y})
+    with pytest.raises(InputError, match="'rad' in column 'lon_rad' is not a known unit"):
+        load(path)
+
+
+def test_of_a_body_in_the_image_and_in_the_world_one_is_to_be_named(tmp_path: Path) -> None:
+    values = {"t": T, "x_cam": PX, "y_cam": PY, "x_world": X, "y_world": Y}
+    path = columns(tmp_path, values)
+    with pytest.raises(InputError, match="'x_cam', 'x_world' may be one body several times"):
+        load(path)
+    check(load(path, columns={"x": "x_world:m", "y": "y_world:m"}))

@@ -177,6 +177,16 @@ def test_stacked_tracks_of_unknown_names_are_refused(
         load(path, frame_rate=25.0)
 
 
+def test_frames_that_repeat_where_a_second_body_comes_later_are_refused(tmp_path: Path) -> None:
+    rows = sorted([(k, X[k], Y[k]) for k in range(40)] + [(k, -X[k], 0.1) for k in range(12, 40)])
+    path = table(tmp_path, "Bar,x_m,y_m", lambda k: "{},{},{}".format(*rows[k]), rows=68)
+    with pytest.raises(InputError, match="'Bar' counts frames"):
+        load(path, frame_rate=25.0)
+    # A number that goes up every few rows of one body counts no frames.
+    path = table(tmp_path, "Bar,x_m,y_m", lambda k: f"{int(k**1.3) // 4},{X[k]},{Y[k]}")
+    check(load(path, frame_rate=25.0))
+
+
 def test_rows_of_known_bodies_without_a_clock_count_for_each(tmp_path: Path) -> None:
     rows = [f"{b},{X[k] + b},{Y[k]}" for k in range(40) for b in range(2)]
     path = table(tmp_path, "id,x_m,y_m", lambda k: rows[k], rows=80)
@@ -199,6 +209,9 @@ BOXES: dict[str, tuple[Callable[[float, float], str], dict[str, Any]]] = {
     "frame,c0x,c0y,c1x,c1y,c2x,c2y,c3x,c3y": (
         lambda x, y: f"{x - 9},{y - 9},{x + 9},{y - 9},{x + 9},{y + 9},{x - 9},{y + 9}", {},
     ),
+    "frame,centroid_x,centroid_y,bbox_x,bbox_y,bbox_w,bbox_h": (
+        lambda x, y: f"{x},{y},{x - 9},{y - 9},18,18", {},
+    ),
 }  # fmt: skip
 
 
@@ -218,6 +231,13 @@ def test_a_box_that_is_not_clear_is_refused(tmp_path: Path, head: str) -> None:
     with pytest.raises(InputError, match=r'add `box="xy'):
         load(path, **PIXELS)
     assert len(body_names(load(path, **PIXELS, box="none"))) == (2 if "x1" in head else 1)
+
+
+def test_a_box_next_to_several_bodies_is_refused(tmp_path: Path) -> None:
+    row: Row = lambda k: f"{k},{X[k]},{Y[k]},{Y[k]},{X[k]},1,1"  # noqa: E731
+    path = table(tmp_path, "frame,cx,cy,b_x,b_y,w,h", row)
+    with pytest.raises(InputError, match="next to several bodies, '', 'b'"):
+        load(path, **PIXELS)
 
 
 def test_two_bodies_are_no_corners(tmp_path: Path) -> None:
@@ -348,6 +368,11 @@ def test_marks_of_what_was_not_seen_are_named(tmp_path: Path, mark: str, x: str)
     np.testing.assert_allclose(track.x, 0.2 + np.delete(X, sorted(lost)), atol=1e-5)
 
 
+def test_an_origin_that_the_body_goes_round_is_named(tmp_path: Path) -> None:
+    row: Row = lambda k: f"{T[k]},0,0" if k in (8, 9, 20) else f"{T[k]},{X[k]},{Y[k]}"  # noqa: E731
+    assert 'add `missing="0,0"`' in warnings_of(load(table(tmp_path, "t,x,y", row)))
+
+
 def test_the_last_place_held_is_named(tmp_path: Path) -> None:
     at = [8 if 8 <= k < 13 else 25 if 25 <= k < 30 else k for k in range(40)]
     path = table(tmp_path, "t,x,y", lambda k: f"{T[k]},{X[at[k]]},{Y[at[k]]}")
@@ -373,7 +398,9 @@ def test_words_for_what_is_missing(tmp_path: Path, mark: str) -> None:
     assert body_track(load(path)).time.size == 39
 
 
-@pytest.mark.parametrize("name", ["p", "conf", "likelihood", "score", "valid", "visible"])
+@pytest.mark.parametrize(
+    "name", ["p", "conf", "likelihood", "score", "valid", "visible", "is_tracked"]
+)
 def test_confidences(tmp_path: Path, name: str) -> None:
     row: Row = lambda k: f"{T[k]},{X[k]},{Y[k]},{0 if k % 10 == 0 else 1}"  # noqa: E731
     path = table(tmp_path, f"t,x,y,{name}", row)

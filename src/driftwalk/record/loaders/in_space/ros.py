@@ -56,16 +56,14 @@ def _poses(message: Any, topic: str) -> Iterator[Pose]:
     if hasattr(message, "poses"):
         found = {str(number): one for number, one in enumerate(message.poses)}
     for name, one in found.items():
-        yield Pose(name, stamp, parent, _values(one))
-
-
-def _values(pose: Any) -> tuple[float, ...]:
-    if hasattr(pose, "theta"):
-        half = 0.5 * pose.theta
-        return (pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
-    moves = hasattr(pose, "translation")
-    at, turn = (pose.translation, pose.rotation) if moves else (pose.position, pose.orientation)
-    return (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
+        if hasattr(one, "theta"):
+            half = 0.5 * one.theta
+            values = (one.x, one.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
+        else:
+            moves = hasattr(one, "translation")
+            at, turn = (one.translation, one.rotation) if moves else (one.position, one.orientation)
+            values = (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
+        yield Pose(name, stamp, parent, values)
 
 
 METADATA: Final = "metadata.yaml"

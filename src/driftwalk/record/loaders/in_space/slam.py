@@ -8,20 +8,21 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 from typing import Final
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.column_names import unit_of_name
+from driftwalk.record.loaders.plain import described
 from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.space import PARTS, SpaceColumns, read_in_space
+from driftwalk.record.space import PARTS
 from driftwalk.record.text import header_rows
 from driftwalk.record.text_head import first_line, first_lines, first_row, is_numeric_row
 
 _START: Final = re.compile(r"#\s*timestamp\b[^,]*(,\s*p_\w*[xyz]\b[^,]*){3}")
 _PART: Final = re.compile(r"([pq])_(?:[A-Za-z]+_)*([wxyz])\s*(?:\[.*\])?")
-_POSITION: Final = ("px", "py", "pz")
 
 
 class EurocLoader:
@@ -38,24 +39,31 @@ class EurocLoader:
         """Read the one body; its whole nanoseconds stay exact."""
         names = [name.lstrip("# ") for name in first_row(path)]
         columns = {
-            "".join(match.groups()): column
-            for column, name in enumerate(names)
+            "".join(match.groups()).removeprefix("p"): name
+            for name in names
             if (match := _PART.fullmatch(name))
         }
-        lacking = [part for part in _POSITION if part not in columns]
+        lacking = [axis for axis in "xyz" if axis not in columns]
         if lacking:
-            raise FormatError(f"the header names no column of p_…_{lacking[0][1]}", line=1)
-        turns = [columns[part] for part in PARTS] if set(PARTS) <= set(columns) else []
-        body = SpaceColumns([columns[part] for part in _POSITION], turns)
+            raise FormatError(f"the header names no column of p_…_{lacking[0]}", line=1)
+        wanted = ("x", "y", "z", *(PARTS if set(PARTS) <= set(columns) else ()))
         unit = unit_of_name(names[0])
-        return read_in_space(
+        return _in_space(
             path,
-            TableLayout(",", names, 1, clock=0),
-            {"0": body},
-            options.up or "z",
-            clock_unit=unit if unit in CLOCK_UNITS else "ns",
-            length_unit="m",
+            options,
+            {part: columns[part] for part in wanted},
+            TableLayout(",", names, 1),
+            unit if unit in CLOCK_UNITS else "ns",
         )
+
+
+def _in_space(
+    path: Path, options: ReadOptions, columns: dict[str, str], layout: TableLayout, unit: str
+) -> RawRecording:
+    """Return the one body, whose clock is in the first column and has that unit."""
+    named = {"t": f"{layout.names[0]}:{unit}", **columns}
+    stated = replace(options, up=options.up or "z")
+    return described(path, stated, named, layout, length_unit="m", y_axis="up")
 
 
 _NAMES: Final = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
@@ -74,22 +82,18 @@ class TumLoader:
         named = any(line.lstrip("# ").split() == _NAMES for line in lines if line[:1] == "#")
         if not rows or not all(len(row) == len(_NAMES) and is_numeric_row(row) for row in rows):
             return 0.0
-        return 0.9 if named or all(_is_unit(row[4:]) for row in rows) else 0.0
+        try:
+            lengths = [math.hypot(*map(float, row[4:])) for row in rows]
+        except ValueError:
+            lengths = [0.0]
+        return 0.9 if named or all(abs(one - 1.0) < 0.02 for one in lengths) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the one body."""
         comments = takewhile(lambda line: line.startswith("#"), header_rows(path, 20))
-        layout = TableLayout(" ", _NAMES, len(list(comments)), clock=0)
-        body = SpaceColumns(range(1, 4), range(4, 8))
-        up = options.up or "z"
-        return read_in_space(path, layout, {"0": body}, up, clock_unit="s", length_unit="m")
-
-
-def _is_unit(fields: list[str]) -> bool:
-    try:
-        return abs(math.hypot(*map(float, fields)) - 1.0) < 0.02
-    except ValueError:
-        return False
+        layout = TableLayout(" ", _NAMES, len([*comments]))
+        columns = dict(zip(("x", "y", "z", *PARTS), _NAMES[1:], strict=True))
+        return _in_space(path, options, columns, layout, "s")
 
 
 LOADERS = (EurocLoader(), TumLoader())

@@ -12,13 +12,7 @@ from typing import Final
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.pose import (
-    Confidence,
-    Point,
-    Poses,
-    choose_keypoints,
-    recording_of_poses,
-)
+from driftwalk.record.pose import Confidence, Point, choose_keypoints, recording_of_poses
 from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.pandas_frame import frame_in
@@ -149,7 +143,7 @@ def _recording(
         likelihood = columns[place["likelihood"]] if "likelihood" in place else None
         return columns[place["x"]], columns[place["y"]], likelihood
 
-    return recording_of_poses(Poses(places, read_point), chosen, frame, options, usual=USUAL)
+    return recording_of_poses(places, read_point, chosen, frame, options, usual=USUAL)
 
 
 LOADER = DeepLabCutLoader()

@@ -15,8 +15,8 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.record.pose import Confidence, Point, Poses, choose_keypoints, recording_of_poses
-from driftwalk.record.raw import LENGTH_UNITS, Array, Marks, RawBody, RawRecording, ReadOptions
+from driftwalk.record.pose import Confidence, Point, choose_keypoints, recording_of_poses
+from driftwalk.record.raw import LENGTH_UNITS, Array, Marks, RawRecording, ReadOptions
 from driftwalk.schema.stores.netcdf import MAGIC, open_netcdf, text_attribute
 
 if TYPE_CHECKING:
@@ -79,26 +79,25 @@ class MovementLoader:
         time, unit = _clock(dataset)
         sleap = str(dataset.attrs.get("source_software")) == "SLEAP"
         chosen = choose_keypoints(keypoints, options)
-        poses, usual = Poses(places, read_point), SLEAP if sleap else USUAL
-        raw = recording_of_poses(poses, chosen, time, options, usual=usual)
+        usual = SLEAP if sleap else USUAL
+        raw = recording_of_poses(places, read_point, chosen, time, options, usual=usual)
         own = "driftwalk" in dataset.attrs
         # Other programs may call something else so.
         if own and "orientation" in dataset and chosen.heading is None:
-            _orient(raw.bodies, _orientation(dataset, individuals))
+            angles = _orientation(dataset, individuals)
+            for body in raw.bodies:
+                theta = angles[body.name]
+                body.theta = theta if np.isfinite(theta).any() else None
         rate = dataset.attrs.get("fps")
+        units = (*LENGTH_UNITS, "px")
+        stated = next((one for one in units if one == position.attrs.get("units")), None)
         return replace(
             raw,
             clock_unit=unit,
-            length_unit=_length_unit(position) or options.length_unit or "px",
+            length_unit=stated or options.length_unit or "px",
             frame_rate_hz=float(rate) if rate is not None and unit == "frame" else None,
             attrs=_known(dataset, path) if own else {},
         )
-
-
-def _length_unit(position: xr.DataArray) -> str:
-    """Return the unit that the positions state, ``""`` where they state none that is known."""
-    unit = position.attrs.get("units")
-    return unit if isinstance(unit, str) and unit in (*LENGTH_UNITS, "px") else ""
 
 
 def _orientation(dataset: xr.Dataset, individuals: list[str]) -> dict[str, Array]:
@@ -110,12 +109,6 @@ def _orientation(dataset: xr.Dataset, individuals: list[str]) -> dict[str, Array
         raise FormatError("'orientation' does not state its unit, rad")
     values = angles.transpose("time", "individuals").values.astype(np.float64)
     return {name: np.ascontiguousarray(values[:, at]) for at, name in enumerate(individuals)}
-
-
-def _orient(bodies: list[RawBody], angles: dict[str, Array]) -> None:
-    for body in bodies:
-        theta = angles[body.name]
-        body.theta = theta if np.isfinite(theta).any() else None
 
 
 def _known(dataset: xr.Dataset, path: Path) -> dict[str, Any]:

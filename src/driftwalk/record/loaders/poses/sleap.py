@@ -11,12 +11,11 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.cleaning.several_bodies import split_bodies
-from driftwalk.record.pose import Confidence, Point, Poses, choose_keypoints, recording_of_poses
-from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.pose import Confidence, Point, choose_keypoints, recording_of_poses
+from driftwalk.record.raw import Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5, text_of
 from driftwalk.record.text import read_table
 from driftwalk.record.text_head import first_names, first_row
@@ -61,8 +60,7 @@ class SleapLoader:
         }
         frame = np.arange(tracks.shape[3], dtype=np.float64)
         chosen = choose_keypoints(nodes, options)
-        poses = Poses(places, read_point)
-        return recording_of_poses(poses, chosen, frame, options, usual=USUAL)
+        return recording_of_poses(places, read_point, chosen, frame, options, usual=USUAL)
 
 
 def _in_order(
@@ -125,31 +123,26 @@ class SleapCsvLoader:
             x, y, score = nodes[node]
             return table.numbers[x], table.numbers[y], table.numbers.get(score)
 
-        poses = Poses({"0": {node: node for node in nodes}}, read_point)
-        raw = recording_of_poses(poses, chosen, table.numbers[frame], options, usual=USUAL)
+        own, clock = {"0": {node: node for node in nodes}}, table.numbers[frame]
+        raw = recording_of_poses(own, read_point, chosen, clock, options, usual=USUAL)
         if track is not None:
             (rows,) = raw.bodies
-            _require_tracks(table.labels[track], table.codes[track], rows.clock)
             raw.bodies = split_bodies(
                 table.codes[track],
-                [label or "0" for label in table.labels[track]],
+                table.labels[track],
                 clock=rows.clock,
                 x=rows.x,
                 y=rows.y,
                 theta=rows.theta,
             )
+            for one in raw.bodies:
+                if not one.name and np.unique(one.clock).size < one.clock.size:
+                    raise FormatError(
+                        "several instances of one frame have no track: let SLEAP track them, and "
+                        "export again"
+                    )
+                one.name = one.name or "0"
         return raw
-
-
-def _require_tracks(labels: list[str], codes: Codes, frame: Array) -> None:
-    """Refuse several instances of a frame that no track tells apart."""
-    if "" not in labels:
-        return
-    frames = frame[codes == labels.index("")]
-    if np.unique(frames).size < frames.size:
-        raise FormatError(
-            "several instances of one frame have no track: let SLEAP track them, and export again"
-        )
 
 
 LOADERS = (SleapLoader(), SleapCsvLoader())

@@ -56,30 +56,26 @@ class SwisTrackTracksLoader:
         files = _track_files(path) if path.is_dir() else [path]
         if not files:
             raise FormatError("the folder holds no track files (track_00000000.txt)")
-        tables = {_track_name(file): _read_one(file) for file in files}
+        matches = [_FILE_NAME.fullmatch(file.name) for file in files]
+        names = [str(int(match[1])) if match else "0" for match in matches]
+        tables = dict(zip(names, map(_read_one, files), strict=True))
         first = next(iter(tables.values()))
         if any(set(table.numbers) != set(first.numbers) for table in tables.values()):
             raise FormatError("the folder mixes track files of two SwisTrack versions")
-        if len(first.numbers) == len(NEW):
-            bodies = [
-                RawBody(name, *(table.numbers[column] for column in range(3)))
-                for name, table in tables.items()
-            ]
+        old, all_numbers = len(first.numbers) > len(NEW), [one.numbers for one in tables.values()]
+        calibrated = old and any(one[at].any() for one in all_numbers for at in (3, 4))
+        world = calibrated and options.metres_per_pixel is None
+        timed = (
+            old and options.frame_rate_hz is None and all((n[8] >= 0).all() for n in all_numbers)
+        )
+        used = (8 if timed else 0, *((3, 4) if world else (1, 2)), *((6,) if old else ()))
+        bodies = [
+            RawBody(name, *(numbers[at] for at in used))
+            for name, numbers in zip(tables, all_numbers, strict=True)
+        ]
+        if not old:
             return RawRecording(bodies, length_unit="px")
-        return _old_recording(tables, options)
-
-
-def _old_recording(tables: dict[str, Table], options: ReadOptions) -> RawRecording:
-    calibrated = any(table.numbers[column].any() for table in tables.values() for column in (3, 4))
-    world = calibrated and options.metres_per_pixel is None
-    timed = options.frame_rate_hz is None and all(
-        (table.numbers[8] >= 0).all() for table in tables.values()
-    )
-    used = (8 if timed else 0, *((3, 4) if world else (1, 2)), 6)
-    bodies = [
-        RawBody(name, *(table.numbers[column] for column in used)) for name, table in tables.items()
-    ]
-    return _recording(bodies, "ms" if timed else "frame", world=world)
+        return _recording(bodies, "ms" if timed else "frame", world=world)
 
 
 def _recording(
@@ -122,11 +118,6 @@ def _read_one(path: Path) -> Table:
 
 def _track_files(folder: Path) -> list[Path]:
     return sorted(file for file in folder.iterdir() if _FILE_NAME.fullmatch(file.name))
-
-
-def _track_name(path: Path) -> str:
-    match = _FILE_NAME.fullmatch(path.name)
-    return str(int(match.group(1))) if match else "0"
 
 
 PARTICLES = [

@@ -1,4 +1,4 @@
-"""Texts of tracking programs: DLTdv, smarticles, ToxTrac, UbiTrail, yupi, Kinovea.
+"""Texts of tracking programs: AnimalTA, DLTdv, smarticles, ToxTrac, UbiTrail, yupi, Kinovea.
 
 DLTdv: ``pt1_cam1_X,pt1_cam1_Y,...``, pixels, one row per frame. Smarticles: eleven columns without
 header: sync pulse, time, then x, y, theta of three robots. ToxTrac: image space without header
@@ -7,6 +7,10 @@ header: sync pulse, time, then x, y, theta of three robots. ToxTrac: image space
 ``x,y,z,t``) and what else; version 2 begins with ``v2,N``, N rows before the data, version 1 with
 name, interval, dimensions. Kinovea: rows of T X Y, and a line with ``#`` above each track.
 Programs with one header line are descriptions for `HeadedFormat`.
+
+AnimalTA: semicolons, pixels, ``Frame;Time`` and the targets. They stand side by side,
+``X_Arena0_Ind0;Y_Arena0_Ind0``, where their number is fixed, and stacked, ``Arena;Ind;X;Y``, where
+it varies. A target is named by its arena where there are several.
 """
 
 from __future__ import annotations
@@ -21,11 +25,15 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.cleaning.several_bodies import split_bodies
+from driftwalk.record.cleaning.several_bodies import (
+    codes_in_arenas,
+    number_codes,
+    split_bodies,
+)
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.loaders.json_formats import bounded_text, column_of
-from driftwalk.record.loaders.plain import HeadedFormat, side_by_side
-from driftwalk.record.raw import Marks, RawBody, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.loaders.plain import HeadedFormat, described, side_by_side
+from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.tables.in_memory import MemorySource
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import header_rows, read_head, read_table
@@ -36,6 +44,87 @@ from driftwalk.record.text_head import (
     is_numeric_row,
     read_header,
 )
+
+ANIMALTA: Final = ("Frame", "Time", "Arena", "Ind", "X", "Y")
+HALF_DIGIT_S: Final = 0.0051
+"""Times are rounded to 0.01 s."""
+_PLACE: Final = re.compile(r"(?P<axis>[XY])_Arena(?P<arena>\d+)_(?P<body>.+)")
+
+
+class AnimalTALoader:
+    """Pixels; the frame rate comes of frames and times, which are rounded."""
+
+    name = "animalta"
+    description = "AnimalTA coordinates (Frame;Time;X_Arena0_Ind0;... or Frame;Time;Arena;Ind;X;Y)"
+    marks = (
+        Marks("table", ("Frame", "Time", "X_Arena0_Ind0", "Y_Arena0_Ind0")),
+        Marks("table", ANIMALTA),
+    )
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header."""
+        names = first_line(head).split(";")
+        known = names[:2] == ["Frame", "Time"] and (
+            tuple(names[:6]) == ANIMALTA or any(map(_PLACE.fullmatch, names[2:]))
+        )
+        return 0.95 if known else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every target."""
+        names, _, skip, _ = read_header(path, delimiter=";")
+        if names[:2] != ["Frame", "Time"]:
+            raise FormatError("the first columns are not Frame and Time", line=1)
+        stacked = tuple(names[:6]) == ANIMALTA
+        if stacked:
+            bodies, frame, time = _stacked(path, names, skip)
+        else:
+            bodies, columns = side_by_side(path, _PLACE, ";", clock=0)
+            frame, time = columns["Frame"], columns["Time"]
+        rate = None if options.frame_rate_hz is not None else _rate_of_frames(frame, time)
+        timed = rate is None and options.frame_rate_hz is None
+        if timed:
+            order = np.argsort(frame, kind="stable")
+            for one in bodies:
+                places = np.searchsorted(frame[order], one.clock).clip(0, frame.size - 1)
+                one.clock = time[order][places]
+        return RawRecording(
+            bodies,
+            clock_unit="s" if timed else "frame",
+            length_unit="px",
+            frame_rate_hz=rate,
+            rows=frame.size,
+        )
+
+
+def _stacked(path: Path, names: list[str], skip: int) -> tuple[list[RawBody], Array, Array]:
+    table = read_table(path, TableLayout(";", names, skip, (0, 1, 4, 5), (2, 3)))
+    targets = [f"Ind{label}" for label in table.labels[3]]
+    codes, labels = codes_in_arenas((table.codes[2], table.labels[2]), (table.codes[3], targets))
+    frame, time, x, y = (table.numbers[column] for column in (0, 1, 4, 5))
+    bodies = split_bodies(codes, labels, clock=frame, x=x, y=y)
+    return bodies, frame.copy(), time
+
+
+def _rate_of_frames(frame: Array, time: Array) -> float | None:
+    """Return the rate that agrees with all rounded times, None where there is none.
+
+    The whole number that is nearest is taken where it agrees as well: times are short of digits.
+    """
+    known = np.isfinite(frame) & np.isfinite(time)
+    frame, time = frame[known], time[known]
+    if frame.size < 2 or np.ptp(time) <= 0.0:
+        return None
+    exact = float(np.ptp(frame) / np.ptp(time))
+    if exact * 2 * HALF_DIGIT_S > 0.5 * np.ptp(time):
+        return None  # too short a recording: several whole numbers agree
+    for rate in (float(round(exact)), exact):
+        if (
+            rate > 0.0
+            and (np.abs(time - time[0] - (frame - frame[0]) / rate) < 2 * HALF_DIGIT_S).all()
+        ):
+            return rate
+    return None
+
 
 _DLTDV = re.compile(r"(?P<body>pt\d+_cam\d+)_(?P<axis>[XY])", re.IGNORECASE)
 
@@ -83,17 +172,9 @@ class SmarticlesLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the three robots."""
-        names, delimiter, skip, has_header = read_header(path, delimiter=options.delimiter)
-        if has_header or len(names) != 11:
-            raise FormatError("expected eleven columns without a header", line=1)
-        table = read_table(path, TableLayout(delimiter, SMARTICLES, skip, tuple(range(1, 11))))
-        bodies = [
-            RawBody(
-                str(at), *(table.numbers[column] for column in (1, *range(3 * at - 1, 3 * at + 2)))
-            )
-            for at in (1, 2, 3)
-        ]
-        return RawRecording(bodies, clock_unit="s", bare_clock="", separate=True, length_unit="px")
+        layout = TableLayout(options.delimiter or ",", SMARTICLES)
+        own = {"bare_clock": "", "separate": True, "length_unit": "px"}
+        return described(path, options, {}, layout, **own)
 
 
 TOXTRAC: Final = ["frame", "arena", "track", "x", "y", "label"]
@@ -129,13 +210,8 @@ class ToxTracLoader:
         clock, arena, track, x, y, label = (table.numbers[column] for column in range(6))
         if not (np.isfinite(arena) & np.isfinite(track)).all():
             raise FormatError("a row names no arena or no track")
-        pairs, codes = np.unique(np.stack([arena, track]), axis=1, return_inverse=True)
-        several = np.unique(pairs[0]).size > 1
-        labels = [
-            f"{place:g}/{number:g}" if several else f"{number:g}"
-            for place, number in pairs.T.tolist()
-        ]
-        bodies = split_bodies(codes.ravel().astype(np.int32), labels, clock=clock, x=x, y=y)
+        codes, labels = codes_in_arenas(number_codes(arena), number_codes(track))
+        bodies = split_bodies(codes, labels, clock=clock, x=x, y=y)
         # Label 0 is a position that was predicted, not seen.
         predicted = int((label == 0.0).sum())
         return RawRecording(
@@ -168,26 +244,19 @@ class UbiTrailLoader:
         lines = first_lines(head, 2)
         return 0.95 if len(lines) == 2 and lines[1].split(",") == UBITRAIL else 0.0
 
-    def read(self, path: Path, _options: ReadOptions) -> RawRecording:
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every area and turn widths of the area into pixels."""
         widths = _area_widths(path)
-        table = read_table(path, TableLayout(",", UBITRAIL, 2, (2, 3, 4), (0,)))
-        areas = table.labels[0]
-        unknown = [area for area in areas if area not in widths]
-        if unknown:
-            raise FormatError(f"the metadata give no width for area {unknown[0]}", line=1)
-        scale = np.array([widths[area] for area in areas])[table.codes[0]]
-        with np.errstate(over="ignore"):  # an infinite position is a gap
-            x, y = (table.numbers[column] * scale for column in (2, 3))
-        bodies = split_bodies(table.codes[0], areas, clock=table.numbers[4], x=x, y=y)
+        columns = {"t": "time:ms", "x": "X", "y": "Y", "body": "Area"}
         # An area is a body. The clock, of a video's file, often says the same of two frames.
-        return RawRecording(
-            bodies,
-            clock_unit="ms",
-            length_unit="px",
-            separate=True,
-            attrs={"bodies_apart": "yes"},
-        )
+        own = {"length_unit": "px", "separate": True, "attrs": {"bodies_apart": "yes"}}
+        raw = described(path, options, columns, TableLayout(",", UBITRAIL, 2), **own)
+        for body in raw.bodies:
+            if body.name not in widths:
+                raise FormatError(f"the metadata give no width for area {body.name}", line=1)
+            with np.errstate(over="ignore"):  # an infinite position is a gap
+                body.x, body.y = (axis * widths[body.name] for axis in (body.x, body.y))
+        return raw
 
 
 def _area_widths(path: Path) -> dict[str, float]:
@@ -227,7 +296,7 @@ class YupiLoader:
         )
         return 0.9 if known else 0.0
 
-    def read(self, path: Path, _options: ReadOptions) -> RawRecording:
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the trajectory."""
         rows = [split_fields(line, ",") or [""] for line in header_rows(path, 20)]
         second = bool(rows) and rows[0][0] == "v2"
@@ -241,9 +310,11 @@ class YupiLoader:
         if len(axes) < 2:
             raise FormatError(f"has {len(axes)} dimensions, and a path in the plane needs two")
         names = [*axes, "t", *(one for one in further if one)]
-        table = read_table(path, TableLayout(",", names, skip, (0, 1, len(axes))))
-        body = RawBody(name or "0", table.numbers[len(axes)], table.numbers[0], table.numbers[1])
-        return RawRecording([body], clock_unit="s", bare_clock="")
+        columns = {"t": "t:s", "x": "x", "y": "y"}
+        layout = TableLayout(",", names, skip)
+        raw = described(path, options, columns, layout, bare_clock="", length_unit="")
+        raw.bodies[0].name = name or "0"
+        return raw
 
 
 _KINOVEA: Final = b"#Kinovea Trajectory"
@@ -297,6 +368,7 @@ LOADERS = (
         header=("Frame", "Time", "TrackId", "x", "y"),
         columns={"t": "Time:s", "x": "x", "y": "y", "body": "TrackId"},
     ),
+    AnimalTALoader(),
     DltdvLoader(),
     SmarticlesLoader(),
     ToxTracLoader(),

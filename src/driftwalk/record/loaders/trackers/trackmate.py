@@ -207,18 +207,11 @@ def _parsed(path: Path) -> _Contents:
             while block := file.read(1 << 20):
                 parser.Parse(block)
             parser.Parse(b"", True)
-    except expat.ExpatError as error:
-        reason = expat.ErrorString(error.code)
-        raise FormatError(f"is damaged XML: {reason}", line=error.lineno) from error
-    except LookupError as error:
-        if not isinstance(error, KeyError):  # expat asks Python for encodings that it lacks
-            raise FormatError(f"is damaged XML: {error}") from error
-        what = f"an element lacks its attribute {error}"
-        raise FormatError(what, line=parser.CurrentLineNumber) from error
-    except ValueError as error:
-        raise FormatError(
-            f"an attribute is no number: {error}", line=parser.CurrentLineNumber
-        ) from error
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        # expat asks Python for encodings that it lacks.
+        lacks = isinstance(error, KeyError)
+        what = f"an element lacks its attribute {error}" if lacks else error
+        raise FormatError(f"is damaged XML: {what}", line=parser.CurrentLineNumber) from error
     return contents
 
 

@@ -61,8 +61,7 @@ class TrackpyLoader:
 
 def _of_csv(path: Path) -> dict[str, Array]:
     names = first_row(path)
-    _require(names)
-    places = {name: names.index(name) for name in NEEDED}
+    places = _places(names)
     table = read_table(path, TableLayout(",", names, 1, tuple(sorted(places.values()))))
     return {name: table.numbers[place] for name, place in places.items()}
 
@@ -93,12 +92,12 @@ def _only_table(contents: Hdf5Contents, groups: list[str]) -> Frame:
 
 
 def _columns(frame: Frame) -> dict[str, Array]:
-    names = [column[0] if len(column) == 1 else "" for column in frame.columns]
-    _require(names)
-    return {name: frame.numbers(names.index(name)) for name in NEEDED}
+    places = _places([column[0] if len(column) == 1 else "" for column in frame.columns])
+    return {name: frame.numbers(place) for name, place in places.items()}
 
 
-def _require(names: list[str]) -> None:
+def _places(names: list[str]) -> dict[str, int]:
+    """Return the columns that are needed, or say which lack."""
     missing = [name for name in NEEDED if name not in names]
     if missing == ["particle"]:
         raise FormatError(
@@ -107,6 +106,7 @@ def _require(names: list[str]) -> None:
     if missing:
         shown = ", ".join(names[:12])
         raise FormatError(f"no column {', '.join(missing)} as trackpy has it, among {shown}")
+    return {name: names.index(name) for name in NEEDED}
 
 
 LOADER = TrackpyLoader()

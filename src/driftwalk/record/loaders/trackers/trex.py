@@ -52,7 +52,8 @@ class _Columns:
             raise FormatError("has no 'frame'")
         timed = "time" in self.names and options.frame_rate_hz is None
         clock = self.read("time" if timed else "frame")
-        x, y = self.point(options.keypoint or self._centre())
+        centres = (name for name in CENTRES if set(_keys(name)) <= self.names)
+        x, y = self.point(options.keypoint or next(centres, CENTRES[0]))
         theta = None
         if options.heading is not None:
             theta = angle_between(*map(self.point, options.heading))
@@ -91,12 +92,6 @@ class _Columns:
             raise FormatError("points of a pose are in pixels, and cm_per_pixel is not there")
         return x * self.cm_per_pixel, y * self.cm_per_pixel
 
-    def _centre(self) -> str:
-        found = next((name for name in CENTRES if set(_keys(name)) <= self.names), None)
-        if found is None:
-            raise FormatError("has no position (X#wcentroid, Y#wcentroid)")
-        return found
-
 
 class TrexLoader:
     """One body per file; `keypoint` chooses among the centres and the points of a pose."""
@@ -124,7 +119,7 @@ class TrexLoader:
         files = _files(path) if path.is_dir() else [path]
         if not files:
             raise FormatError("the folder holds no file of an individual (VIDEO_id0.npz)")
-        videos = sorted({_video(file) for file in files})
+        videos = sorted({_name_of(file)[0] for file in files})
         if len(videos) > 1:
             raise FormatError(
                 f"the folder holds several videos ({', '.join(videos[:4])}): give a folder with "
@@ -140,21 +135,17 @@ class TrexLoader:
 def _files(folder: Path) -> list[Path]:
     """Return the files of individuals in a folder, in the order of their numbers."""
     found = [file for file in folder.glob("*.npz") if _is_individual(members(file))]
-    return sorted(found, key=lambda file: (_video(file), int(_individual(file))))
+    return sorted(found, key=lambda file: (_name_of(file)[0], int(_name_of(file)[1])))
 
 
 def _is_individual(names: set[str]) -> bool:
     return "frame" in names and bool({"X#wcentroid", "X"} & names)
 
 
-def _video(file: Path) -> str:
+def _name_of(file: Path) -> tuple[str, str]:
+    """Return the video and the individual that a file is of."""
     match = _NUMBER.fullmatch(file.name)
-    return match[1] if match else file.stem
-
-
-def _individual(file: Path) -> str:
-    match = _NUMBER.fullmatch(file.name)
-    return match[2] if match else "0"
+    return (match[1], match[2]) if match else (file.stem, "0")
 
 
 def _keys(point: str) -> tuple[str, str]:
@@ -167,7 +158,7 @@ def _keys(point: str) -> tuple[str, str]:
 
 @naming_its_file
 def _read(path: Path, options: ReadOptions) -> RawRecording:
-    name = _individual(path)
+    _, name = _name_of(path)
     if not file_start(path).startswith(ZIP):
         return _of_csv(path).recording(name, options)
     with opened_npz(path) as arrays:
