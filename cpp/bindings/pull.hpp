@@ -31,6 +31,7 @@ public:
     Radial& own = what == "centres" ? centres_ : what == "faces" ? faces_ : resistance_;
     own.twice.assign(cells.data(), cells.data() + cells.size());
     own.single.assign(cells.data(), cells.data() + cells.size());
+    own.single.resize(cells.size() + 2); // two cells are read at once
     driftwalk::RadialTable& table = what == "centres" ? rules_.centres
                                     : what == "faces" ? rules_.faces
                                                       : rules_.resistance;

@@ -120,53 +120,69 @@ bool cells_are_free(Scene& scene, const Merge& merge) {
   return true;
 }
 
-// Where a block was before the step, from another one.
-Vec2 before_from(const Scene& scene, int block, int other) {
-  const ScenePose& before = assembly_of(scene, other).before;
+// Where a block was before the step.
+Vec2 place_before(const Scene& scene, int block) {
+  const ScenePose& before = assembly_of(scene, block).before;
   const Vec2 axis{before.cosine, before.sine}, across{-before.sine, before.cosine};
-  const SceneBlock& o = scene.block[other];
-  const Vec2 at = Vec2{before.x, before.y} + axis * o.offset_x + across * o.offset_y;
-  return at - centre(scene, block);
+  const SceneBlock& b = scene.block[block];
+  return Vec2{before.x, before.y} + axis * b.offset_x + across * b.offset_y;
 }
 
 // Whether two blocks of different assemblies overlap, as they are or with the other where it was:
 // a jam takes it back there.
-bool overlaps(const AssemblyRules& rules, const Scene& scene, int block, int other) {
+bool overlaps(const AssemblyRules& rules, const Scene& scene, int block, int other, Vec2 was) {
   constexpr double tolerance = 1e-4;
   if (!are_far(rules, scene, block, other) &&
       overlap_of(rules, scene, block, other).depth > tolerance) {
     return true;
   }
-  const Vec2 between = before_from(scene, block, other);
+  const Vec2 between = was - centre(scene, block);
   const ScenePose& before = assembly_of(scene, other).before;
   return dot(between, between) < 2 * rules.side * rules.side &&
          overlap_depth(rules.side / 2, between, face_normal(assembly_of(scene, block), 0),
                        {before.cosine, before.sine}) > tolerance;
 }
 
-// A block is far from an assembly whose blocks are all within `reach` of its centre.
+// Only what may be near is looked at: assemblies within a circle, of these blocks, of these the
+// members of this one that they may touch as they are or were.
 bool is_clear_of_others(const AssemblyRules& rules, const Scene& scene, int assembly) {
   const SceneAssembly& a = scene.assembly[assembly];
   double farthest = 0;
+  int members = 0;
   for (int b = a.first; b >= 0; b = scene.block[b].next) {
     const SceneBlock& block = scene.block[b];
     farthest =
         std::max(farthest, block.offset_x * block.offset_x + block.offset_y * block.offset_y);
+    scene.by_cell[members++] = {block.x, block.y, assembly, b};
   }
-  const double reach = std::sqrt(farthest) + 1.5 * rules.side;
-  const auto is_near = [&](Vec2 from_block) {
-    const Vec2 from_middle = from_block + centre(scene, a.first) - Vec2{a.x, a.y};
-    return dot(from_middle, from_middle) < reach * reach;
+  const double touching = 1.42 * rules.side; // a diagonal and a little more
+  const double reach = std::sqrt(farthest) + touching;
+  const auto square_from_middle = [&](Vec2 place) {
+    const Vec2 from_middle = place - Vec2{a.x, a.y};
+    return dot(from_middle, from_middle);
   };
-  for (int c = 0; c < scene.blocks; ++c) {
-    if (scene.block[c].assembly == assembly ||
-        (!is_near(centre(scene, c) - centre(scene, a.first)) &&
-         !is_near(before_from(scene, a.first, c)))) {
+  for (int other = 0; other < scene.blocks; ++other) {
+    const SceneAssembly& others = scene.assembly[other];
+    if (others.blocks == 0 || other == assembly) {
       continue;
     }
-    for (int b = a.first; b >= 0; b = scene.block[b].next) {
-      if (overlaps(rules, scene, b, c)) {
-        return false;
+    // No member is farther from the centre of mass than the radius of gyration of all as one.
+    const double within = reach + std::sqrt(1.001 * others.inertia / rules.mass);
+    if (square_from_middle({others.x, others.y}) > within * within &&
+        square_from_middle({others.before.x, others.before.y}) > within * within) {
+      continue;
+    }
+    for (int c = others.first; c >= 0; c = scene.block[c].next) {
+      const Vec2 is = centre(scene, c), was = place_before(scene, c);
+      if (square_from_middle(is) > reach * reach && square_from_middle(was) > reach * reach) {
+        continue;
+      }
+      const double limit = touching + std::sqrt(dot(is - was, is - was));
+      for (const PlacedBlock* b = scene.by_cell; b < scene.by_cell + members; ++b) {
+        const Vec2 between{b->x - is.x, b->y - is.y};
+        if (dot(between, between) < limit * limit && overlaps(rules, scene, b->block, c, was)) {
+          return false;
+        }
       }
     }
   }

@@ -13,13 +13,12 @@ template <class Real>
 struct PackMemory {
   static constexpr int lanes = Numbers<Real>::lanes;
   bool one_world;
-  Member<Real>* members;                         // [row]
-  Sums<Real>* sums;                              // [row]
-  Pulled<Real>* pulled;                          // [row]
-  Pulled<typename Numbers<Real>::Scalar>* alone; // [block] of one world
-  BlockBook* books;                              // [block][lane], of one world [block]
-  Bond* bonds;                                   // [world][bond_room]
-  Crowd<Real> crowd;                             // of one world
+  Member<Real>* members; // [row]
+  Sums<Real>* sums;      // [row]
+  Pulled<Real>* pulled;  // [row]
+  BlockBook* books;      // [block][lane], of one world [block]
+  Bond* bonds;           // [world][bond_room]
+  Crowd<Real> crowd;     // of one world
 
   // Whether a pack with room for this many blocks holds one world.
   static constexpr bool is_one_world(int blocks) {
@@ -59,7 +58,6 @@ private:
     take(books, count * lanes);
     take(bonds, static_cast<std::size_t>(bond_room(blocks)) * (one_world ? 1 : lanes));
     if (one_world) {
-      take(alone, count * lanes);
       crowd.place(take, count);
     }
     return size;

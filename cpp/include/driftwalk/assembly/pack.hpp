@@ -223,8 +223,7 @@ private:
       look_at(physics_, members[row], pulled[row]);
     }
     if constexpr (Crowded) {
-      pull_crowd(rules_.pull, members, pulled, memory_.alone, blocks_,
-                 listed_ ? &scratch_.scene.pairs : nullptr);
+      pull_crowd(rules_.pull, members, pulled, blocks_, listed_ ? &scratch_.scene.pairs : nullptr);
     } else {
       pull_all(rules_.pull, members, pulled, blocks_);
     }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "driftwalk/assembly/member.hpp"
+#include "driftwalk/flow/bilinear.hpp"
 #include "driftwalk/physics/physics.hpp"
 
 DRIFTWALK_LANES_BEGIN
@@ -16,10 +17,6 @@ struct Pulled {
   Real pole[4];                  // of its faces, in the assembly's frame; 0 of a joined one
   Real force_x, force_y, torque; // about its centre
 };
-
-inline float keep(bool mask, float value) {
-  return mask ? value : 0.0f;
-}
 
 inline const float* numbers_of(const RadialTable& table, float) {
   return table.single;
@@ -56,20 +53,29 @@ inline FloatPack<N> look_up(const RadialTable& table, FloatPack<N> squared) {
   const Bits first = Bits{} + table.first, last = first + (table.cells - 1);
   const Bits low = all < first ? first : all, cell = low > last ? last : low;
   const FloatPack<N> start{(typename FloatPack<N>::Vector)(cell << 17)};
-  alignas(sizeof(Bits)) Int32 at[N];
-  const Bits twice = (cell - first) * 2;
-  std::memcpy(at, &twice, sizeof twice);
-  FloatPack<N> value, slope;
-  for (int lane = 0; lane < N; ++lane) {
-    value.v[lane] = table.single[at[lane]];
-    slope.v[lane] = table.single[at[lane] + 1];
-  }
+  alignas(64) Int32 at[N];
+  store_cells(IntPack<N>(cell - first), at);
+  keep_stored(at);
+  // A cell's two numbers are as wide as a node of the flow; what follows them is not used.
+  static_assert(2 * sizeof(float) == flow_record * sizeof(std::int16_t));
+  IntPack<N> record[4];
+  load_cells(reinterpret_cast<const std::int16_t*>(table.single), at, record);
+  const FloatPack<N> value{(typename FloatPack<N>::Vector)record[0].v};
+  const FloatPack<N> slope{(typename FloatPack<N>::Vector)record[1].v};
   return value + slope * max(squared - start, FloatPack<N>(0.0f));
 }
 
 template <int N>
 inline DoublePack<N> look_up(const RadialTable& table, DoublePack<N> squared) {
   return by_lanes(squared, [&](double one) { return look_up(table, one); });
+}
+
+// The squared distance from which on a table is 0.
+inline float end_of(const RadialTable& table) {
+  const Int32 bits = (table.first + table.cells - 1) << 17;
+  float end;
+  std::memcpy(&end, &bits, sizeof end);
+  return end;
 }
 
 // An attraction `strength` times the way (dx, dy) from the first to the second.
@@ -91,24 +97,44 @@ struct FacePoints {
         y{axes.sine * lever, axes.cosine * lever, -axes.sine * lever, -axes.cosine * lever} {}
 };
 
+// Turns the axes of a block by quarters, so that its face 0 is the one that looks towards (x, y):
+// faces beyond their reach then have the same numbers in all pairs.
 template <class Real>
-inline void pull_faces(const PullRules& rules, typename Numbers<Real>::Bool where, Real dx, Real dy,
-                       Pulled<Real>& a, Pulled<Real>& b) {
+inline void turn_towards(Real x, Real y, Pulled<Real>& block) {
   using T = typename Numbers<Real>::Scalar;
-  const Real lever{static_cast<T>(rules.lever)};
-  const FacePoints<Real> first(a.axes, lever), second(b.axes, lever);
-  const Real sign{rules.like_poles_repel ? T(-1) : T(1)};
-  Real pole[4];
-  for (int j = 0; j < 4; ++j) {
-    pole[j] = keep(where, b.pole[j]) * sign;
+  const Real cosine = block.axes.cosine, sine = block.axes.sine;
+  const Real ahead = x * cosine + y * sine, left = y * cosine - x * sine;
+  const auto aside = abs(left) > abs(ahead), back = select(aside, left, ahead) < Real(T(0));
+  const Real along = select(aside, -sine, cosine), up = select(aside, cosine, sine);
+  block.axes = {select(back, -along, along), select(back, -up, up)};
+  Real turned[4];
+  for (int face = 0; face < 4; ++face) {
+    turned[face] = select(aside, block.pole[(face + 1) & 3], block.pole[face]);
   }
+  for (int face = 0; face < 4; ++face) {
+    block.pole[face] = select(back, turned[(face + 2) & 3], turned[face]);
+  }
+}
+
+template <class Real>
+inline void pull_faces(const PullRules& rules, Real dx, Real dy, Pulled<Real>& a, Pulled<Real>& b) {
+  using T = typename Numbers<Real>::Scalar;
+  const Real lever{static_cast<T>(rules.lever)}, end{static_cast<T>(end_of(rules.faces))};
+  turn_towards(dx, dy, a);
+  turn_towards(-dx, -dy, b);
+  const FacePoints<Real> first(a.axes, lever), second(b.axes, lever);
+  const Real sign{rules.like_poles_repel ? T(-1) : T(1)}, none{T(0)};
   for (int i = 0; i < 4; ++i) {
     const Real from_x = dx - first.x[i], from_y = dy - first.y[i];
-    Real sum_x{T(0)}, sum_y{T(0)};
+    Real sum_x = none, sum_y = none;
     for (int j = 0; j < 4; ++j) {
       const Real way_x = from_x + second.x[j], way_y = from_y + second.y[j];
-      const Real strength =
-          look_up(rules.faces, way_x * way_x + way_y * way_y) * (a.pole[i] * pole[j]);
+      const Real squared = way_x * way_x + way_y * way_y;
+      const Real poles = a.pole[i] * (b.pole[j] * sign);
+      if (!any((squared < end) & (poles != none))) {
+        continue;
+      }
+      const Real strength = look_up(rules.faces, squared) * poles;
       const Real force_x = strength * way_x, force_y = strength * way_y;
       sum_x = sum_x + force_x;
       sum_y = sum_y + force_y;
@@ -212,59 +238,108 @@ inline void pull_oriented(const PullRules& rules, T dx, T dy, Pulled<T>& a, Pull
   }
 }
 
-template <class Real>
-inline Pulled<typename Numbers<Real>::Scalar> lane_of_pulled(const Pulled<Real>& all, int lane) {
-  Pulled<typename Numbers<Real>::Scalar> one;
-  const auto take = [lane](const Real& from, auto& to) { to = get(from, lane); };
-  take(all.x, one.x), take(all.y, one.y), take(all.vx, one.vx), take(all.vy, one.vy);
-  take(all.axes.cosine, one.axes.cosine), take(all.axes.sine, one.axes.sine);
-  for (int face = 0; face < 4; ++face) {
-    take(all.pole[face], one.pole[face]);
-  }
-  one.force_x = one.force_y = one.torque = 0;
-  return one;
-}
-
-template <class Real, class T>
-inline void add_lane(const Pulled<T>& one, int lane, Pulled<Real>& all) {
-  put(all.force_x, lane, get(all.force_x, lane) + one.force_x);
-  put(all.force_y, lane, get(all.force_y, lane) + one.force_y);
-  put(all.torque, lane, get(all.torque, lane) + one.torque);
-}
-
-// What two blocks do to each other in the worlds where they are of different assemblies.
-template <class Real>
-inline void pull_pair(const PullRules& rules, typename Numbers<Real>::Bool apart, Pulled<Real>& a,
-                      Pulled<Real>& b) {
-  using T = typename Numbers<Real>::Scalar;
-  const Real dx = b.x - a.x, dy = b.y - a.y;
-  const Real squared = dx * dx + dy * dy;
-  const typename Numbers<Real>::Bool near =
-      apart & (squared < Real(static_cast<T>(rules.reach * rules.reach)));
-  if (!any(near)) {
-    return;
-  }
-  if (rules.centres.cells > 0) {
-    attract(keep(near, look_up(rules.centres, squared)), dx, dy, a, b);
-  }
-  if (rules.resistance.cells > 0) {
-    const Real parting = (b.vx - a.vx) * dx + (b.vy - a.vy) * dy;
-    attract(keep(near, look_up(rules.resistance, squared) * parting), dx, dy, a, b);
-  }
-  if (rules.faces.cells > 0) {
-    pull_faces(rules, near, dx, dy, a, b);
-  }
-  if (rules.oriented.distances > 0) {
-    for (int lane = 0; lane < Numbers<Real>::lanes; ++lane) {
-      if (lane_of(near, lane)) {
-        Pulled<T> first = lane_of_pulled(a, lane), second = lane_of_pulled(b, lane);
-        pull_oriented(rules, get(dx, lane), get(dy, lane), first, second);
-        add_lane(first, lane, a);
-        add_lane(second, lane, b);
-      }
+// Calls `f` with each lane where a mask holds.
+template <class Bool, class F>
+inline void for_lanes(int lanes, const Bool& mask, const F& f) {
+  for (int lane = 0; lane < lanes; ++lane) {
+    if (lane_of(mask, lane)) {
+      f(lane);
     }
   }
 }
+#if defined(DRIFTWALK_USE_X86) && defined(__AVX512F__)
+template <class F>
+inline void for_lanes(int, const Mask<16>& mask, const F& f) {
+  for (unsigned left = _mm512_movepi32_mask((__m512i)mask.v); left != 0; left &= left - 1) {
+    f(__builtin_ctz(left));
+  }
+}
+#endif
+
+// Pairs of blocks within reach of each other, of one world or of several, as many at a time as
+// there are lanes. What a pair does to its blocks depends on nothing but these.
+template <class Real>
+class PullPairs {
+public:
+  using T = typename Numbers<Real>::Scalar;
+  static constexpr int lanes = Numbers<Real>::lanes;
+  struct Place {
+    int row, lane;
+  };
+
+  PullPairs(const PullRules& rules, Pulled<Real>* pulled) : rules_(rules), pulled_(pulled) {}
+
+  void add(Place first, Place second) {
+    place_[0][count_] = first;
+    place_[1][count_] = second;
+    if (++count_ == lanes) {
+      pull();
+    }
+  }
+
+  void pull() {
+    if (count_ == 0) {
+      return;
+    }
+    Pulled<Real> a = taken(place_[0]), b = taken(place_[1]);
+    const Real dx = b.x - a.x, dy = b.y - a.y, squared = dx * dx + dy * dy;
+    if (rules_.centres.cells > 0) {
+      attract(look_up(rules_.centres, squared), dx, dy, a, b);
+    }
+    if (rules_.resistance.cells > 0) {
+      const Real parting = (b.vx - a.vx) * dx + (b.vy - a.vy) * dy;
+      attract(look_up(rules_.resistance, squared) * parting, dx, dy, a, b);
+    }
+    if (rules_.faces.cells > 0) {
+      pull_faces(rules_, dx, dy, a, b);
+    }
+    for (int pair = 0; pair < count_ && rules_.oriented.distances > 0; ++pair) {
+      Pulled<T> first, second;
+      move_lane(a, pair, first, 0);
+      move_lane(b, pair, second, 0);
+      pull_oriented(rules_, T(get(dx, pair)), T(get(dy, pair)), first, second);
+      move_lane(first, 0, a, pair);
+      move_lane(second, 0, b, pair);
+    }
+    for (int pair = 0; pair < count_; ++pair) {
+      give(a, pair, place_[0][pair]);
+      give(b, pair, place_[1][pair]);
+    }
+    count_ = 0;
+  }
+
+private:
+  // Lanes without a pair repeat the first one.
+  Pulled<Real> taken(const Place* places) const {
+    Pulled<Real> all;
+    for (int pair = 0; pair < lanes; ++pair) {
+      const Place from = places[pair < count_ ? pair : 0];
+      move_lane(pulled_[from.row], from.lane, all, pair);
+    }
+    all.force_x = all.force_y = all.torque = Real(T(0));
+    return all;
+  }
+  template <class From, class To>
+  static void move_lane(const From& from, int lane, To& to, int at) {
+    constexpr int numbers = sizeof(Pulled<T>) / sizeof(T);
+    const T* const source = reinterpret_cast<const T*>(&from) + lane;
+    T* const target = reinterpret_cast<T*>(&to) + at;
+    for (int k = 0; k < numbers; ++k) {
+      target[k * (sizeof(To) / sizeof(Pulled<T>))] = source[k * (sizeof(From) / sizeof(Pulled<T>))];
+    }
+  }
+  void give(const Pulled<Real>& from, int pair, Place to) const {
+    Pulled<Real>& block = pulled_[to.row];
+    put(block.force_x, to.lane, get(block.force_x, to.lane) + get(from.force_x, pair));
+    put(block.force_y, to.lane, get(block.force_y, to.lane) + get(from.force_y, pair));
+    put(block.torque, to.lane, get(block.torque, to.lane) + get(from.torque, pair));
+  }
+
+  const PullRules& rules_;
+  Pulled<Real>* pulled_;
+  Place place_[2][lanes];
+  int count_ = 0;
+};
 
 // A block where it would be half a step ahead without forces: so the pull by itself keeps energy,
 // but for an error that does not grow, and angular momentum (drift, kick, drift).
@@ -305,41 +380,48 @@ inline void add_pull(const Physics<Real, T, Law>& physics, const Prepared<T>& ru
 template <class Real>
 inline void pull_all(const PullRules& rules, const Member<Real>* members, Pulled<Real>* pulled,
                      int blocks) {
+  using T = typename Numbers<Real>::Scalar;
+  PullPairs<Real> pairs(rules, pulled);
+  const Real reach{static_cast<T>(rules.reach * rules.reach)};
   for (int a = 0; a < blocks; ++a) {
     for (int b = a + 1; b < blocks; ++b) {
-      const typename Numbers<Real>::Bool apart = !equal(members[a].root, members[b].root);
-      if (any(apart)) {
-        pull_pair(rules, apart, pulled[a], pulled[b]);
+      const Real dx = pulled[b].x - pulled[a].x, dy = pulled[b].y - pulled[a].y;
+      const typename Numbers<Real>::Bool near =
+          (dx * dx + dy * dy < reach) & !equal(members[a].root, members[b].root);
+      if (any(near)) {
+        for_lanes(Numbers<Real>::lanes, near, [&](int lane) { pairs.add({a, lane}, {b, lane}); });
       }
     }
   }
+  pairs.pull();
 }
 
 // The same in one world whose blocks are in the lanes, from its list of near pairs; of no list all.
-template <class Real, class T>
+template <class Real>
 inline void pull_crowd(const PullRules& rules, const Member<Real>* members, Pulled<Real>* pulled,
-                       Pulled<T>* alone, int blocks, const PairList* pairs) {
-  constexpr int lanes = Numbers<Real>::lanes;
-  for (int b = 0; b < blocks; ++b) {
-    alone[b] = lane_of_pulled(pulled[b / lanes], b % lanes);
-  }
-  const auto root = [&](int b) { return get(members[b / lanes].root, b % lanes); };
-  const auto pull = [&](int a, int b) {
-    if (root(a) != root(b)) {
-      pull_pair<T>(rules, true, alone[a], alone[b]);
+                       int blocks, const PairList* list) {
+  using T = typename Numbers<Real>::Scalar;
+  constexpr unsigned lanes = Numbers<Real>::lanes; // so that to divide is to shift
+  PullPairs<Real> pairs(rules, pulled);
+  const T reach = static_cast<T>(rules.reach * rules.reach);
+  const auto look = [&](int first, int second) {
+    const int a = static_cast<int>(first / lanes), at_a = static_cast<int>(first % lanes);
+    const int b = static_cast<int>(second / lanes), at_b = static_cast<int>(second % lanes);
+    const T dx = get(pulled[b].x, at_b) - get(pulled[a].x, at_a);
+    const T dy = get(pulled[b].y, at_b) - get(pulled[a].y, at_a);
+    if (dx * dx + dy * dy < reach && get(members[a].root, at_a) != get(members[b].root, at_b)) {
+      pairs.add({a, at_a}, {b, at_b});
     }
   };
-  for (int k = 0; pairs != nullptr && k < pairs->count; ++k) {
-    pull(pairs->pair[k].first, pairs->pair[k].second);
+  for (int k = 0; list != nullptr && k < list->count; ++k) {
+    look(list->pair[k].first, list->pair[k].second);
   }
-  for (int a = 0; pairs == nullptr && a < blocks; ++a) {
+  for (int a = 0; list == nullptr && a < blocks; ++a) {
     for (int b = a + 1; b < blocks; ++b) {
-      pull(a, b);
+      look(a, b);
     }
   }
-  for (int b = 0; b < blocks; ++b) {
-    add_lane(alone[b], b % lanes, pulled[b / lanes]);
-  }
+  pairs.pull();
 }
 
 DRIFTWALK_LANES_END
