@@ -45,7 +45,7 @@ def test_links_between_the_pages_lead_somewhere(pages: dict[str, str]) -> None:
                 posixpath.normpath(posixpath.join(posixpath.dirname(name), page)) if page else name
             )
             if page.startswith("../"):
-                assert (FOLDER / page).is_file(), f"{name}: {link}"
+                assert Path(posixpath.normpath(FOLDER / page)).is_file(), f"{name}: {link}"
                 continue
             assert page in pages, f"{name}: {link}"
             assert not anchor or anchor in anchors[page], f"{name}: {link}"
