@@ -147,7 +147,10 @@ void sort_pairs(const PairList& from, Scene& scene, PairList& to) {
 
 void find_pairs(const AssemblyRules& rules, Scene& scene) {
   const double pulling = rules.pull.on ? rules.pull.reach : 0.0;
-  const double reach = std::max(touching_reach(rules), pulling) + pair_skin_sides * rules.side;
+  // Blocks move on before the list is looked at again, by less than 0.1 sides a step.
+  const double ahead = rules.pull.on ? 0.1 * rules.side : 0.0;
+  const double reach =
+      std::max(touching_reach(rules), pulling + ahead) + pair_skin_sides * rules.side;
   PairList& pairs = scene.pairs;
   pairs.count = 0;
   if (scene.blocks <= most_blocks_all_pairs) {

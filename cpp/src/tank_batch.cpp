@@ -90,11 +90,11 @@ std::vector<T> rows_of(const std::vector<T>& from, const std::vector<std::int64_
 
 TankBatch::TankBatch(std::vector<TankFlow> flows, std::vector<std::uint64_t> key,
                      const double* start, const LiveBlocks* joined, int threads)
-    : flows_(std::move(flows)), key_(std::move(key)) {
+    : flows_(std::move(flows)), kernels_(chosen_kernels()), key_(std::move(key)) {
   const std::size_t worlds = key_.size(), rows = worlds * static_cast<std::size_t>(blocks());
-  const TankKernels kernels = chosen_kernels();
   const bool twice = flows_.front().twice != nullptr;
-  state_.resize(worlds * (twice ? kernels.twice.kept_bytes : kernels.single.kept_bytes)(blocks()));
+  const auto kept_bytes = twice ? kernels_.twice.kept_bytes : kernels_.single.kept_bytes;
+  state_.resize(worlds * kept_bytes(blocks()));
   pose_.assign(start, start + 3 * rows);
   velocity_.resize(3 * rows);
   assembly_.resize(rows);
@@ -159,11 +159,10 @@ void TankBatch::run(const TankSettings& settings, TankGroup group, int threads) 
           };
     });
   };
-  const TankKernels kernels = chosen_kernels();
   if (flows_.front().twice != nullptr) {
-    run_packs(kernels.twice, [](const TankFlow& flow) -> auto& { return flow.twice->view(); });
+    run_packs(kernels_.twice, [](const TankFlow& flow) -> auto& { return flow.twice->view(); });
   } else {
-    run_packs(kernels.single, [](const TankFlow& flow) -> auto& { return flow.single->view(); });
+    run_packs(kernels_.single, [](const TankFlow& flow) -> auto& { return flow.single->view(); });
   }
 }
 
@@ -172,6 +171,7 @@ TankBatch TankBatch::take(const std::vector<std::int64_t>& world,
   const std::size_t all = key_.size();
   TankBatch taken;
   taken.flows_ = flows_;
+  taken.kernels_ = kernels_;
   for (TankFlow& flow : taken.flows_) {
     flow.start = rows_of(flow.start, world, all);
   }

@@ -278,6 +278,7 @@ int main() {
   check_doubles();
   check_double_packs<2>();
   check_double_packs<4>();
+  check_double_packs<8>();
   check_select_rules();
   check_wrap_angle();
   check_wide_products();

@@ -106,7 +106,7 @@ struct World {
 
 // A table of forces between blocks, which keeps its numbers.
 struct Pull {
-  std::vector<float> single[3], oriented;
+  std::vector<float> oriented;
   std::vector<double> twice[3];
   PullRules rules;
 };
@@ -252,8 +252,7 @@ EXPORT(set_radial)
 void set_radial(Pull* pull, int what, const double* cells, int count, int first) {
   RadialTable* const tables[] = {&pull->rules.centres, &pull->rules.resistance, &pull->rules.faces};
   pull->twice[what].assign(cells, cells + 2 * count);
-  pull->single[what].assign(cells, cells + 2 * count);
-  *tables[what] = {pull->single[what].data(), pull->twice[what].data(), count, first};
+  *tables[what] = {nullptr, pull->twice[what].data(), count, first};
 }
 EXPORT(set_oriented)
 void set_oriented(Pull* pull, const double* coefficient, int distances, int angles, double first,

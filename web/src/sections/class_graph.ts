@@ -57,7 +57,7 @@ function drawArrow(x0: number, y0: number, x1: number, y1: number, wide: number)
   const head = 5 + 1.5 * wide;
   const point = (along: number, aside: number): string =>
     `${(x0 + along * cos - aside * sin).toFixed(1)} ${(y0 + along * sin + aside * cos).toFixed(1)}`;
-  const [begin, neck, end] = [RADIUS + 2, length - RADIUS - 2 - head, length - RADIUS - 2];
+  const [begin, neck, end] = [RADIUS + 2, Math.max(RADIUS + 2, length - RADIUS - 2 - head), length - RADIUS - 2];
   const [half, barb] = [wide / 2, wide / 2 + 2.5];
   const corners = [
     [begin, half],

@@ -41,6 +41,10 @@ public:
     for (int lane = 0; lane < lanes; ++lane) {
       if (lane < worlds) {
         load_lane<Real, T>(rules_, start, memory_, lane);
+        // One assembly until its world begins: blocks of a lane without a world pull at nothing.
+        for (int b = 0; b < blocks_ && !Crowded; ++b) {
+          put(memory_.members[b].root, lane, 0);
+        }
         const int bonds = bond_room(capacity);
         books_[lane].bonds = {memory_.bonds + bonds * lane, 0, bonds};
       }

@@ -60,6 +60,7 @@ private:
   LiveBlocks now();
 
   std::vector<TankFlow> flows_;
+  TankKernels kernels_; // for its whole life: what a world keeps has their layout
   std::vector<std::uint64_t> key_;
   std::int64_t step_ = 0;
   std::vector<char> state_;

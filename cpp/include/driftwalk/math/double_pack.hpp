@@ -1,4 +1,4 @@
-// Packs of doubles, one world per lane, with the bits of single doubles: every operation is one
+// Packs of doubles with the bits of single doubles: every operation is one
 // that IEEE 754 defines, in the same order, and what a single number leaves to the system, a lane
 // does too.
 #pragma once
