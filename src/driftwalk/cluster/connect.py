@@ -260,9 +260,9 @@ def _replace_lost(begun: Any, workers: int, stack: ExitStack) -> None:
     ended = threading.Event()
 
     def look() -> None:
-        # The loop of a cluster that is being closed takes no more calls.
-        with suppress(RuntimeError):
-            while not ended.wait(1.0) and begun.status.name == "running":
+        while not ended.wait(1.0) and begun.status.name == "running":
+            # The loop of a cluster that is being closed takes no more calls.
+            with suppress(RuntimeError):
                 begun.scale(workers)
 
     threading.Thread(target=look, daemon=True).start()

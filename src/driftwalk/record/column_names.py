@@ -114,7 +114,7 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
         return None
     if quantity in OF_BODY and lower & NO_POSITION:
         return None
-    if quantity in ("x", "y", "z") and lower & DIRECTIONS:
+    if quantity in ("x", "y", "z") and lower & DIRECTIONS and not unit:
         return None
     if (unit and unit not in ALLOWED[quantity]) or (unknown and not ALLOWED[quantity]):
         return None

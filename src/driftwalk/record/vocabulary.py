@@ -100,7 +100,7 @@ NO_POSITION: Final = words(
 )
 """Words next to a coordinate or an angle that rule out a position."""
 DIRECTIONS: Final = words("dir direction euler rotations normal")
-"""Words next to x, y or z that make it a part of a direction."""
+"""Words next to x, y or z without a unit that make it a part of a direction."""
 SETPOINTS: Final = words(
     "ref reference cmd command commanded goal target tgt setpoint setp sp desired des demand "
     "origin wind current waypoint wp offset soll sollwert consigne consigna expected planned "

@@ -33,8 +33,8 @@ class BoutPolicy(NamedTuple):
     0.5 to 1.4: 3 of 900. Power on those power laws against the nearest Weibull law: 61 % with 60
     rests, 96 % with 120, all with 350."""
     quiet: float = 6.0
-    """Level over the noise of a position, from which rests are not cut up by the camera: its noise
-    takes a step of a body at rest beyond it once in 8,000."""
+    """Ratio of the level to the noise of a position above which the camera cuts up no rest: its
+    noise takes a step of a body at rest beyond it once in 8,000."""
     fewest: int = 20
     """Bouts without which nothing is said; chosen by hand."""
 

@@ -190,7 +190,7 @@ def _ranged(parameter: Parameter, scales: Scales) -> Parameter:
         "m/s": (0.05 * scales.speed, max(2.0 * scales.fastest, 2.0 * scales.speed)),
         "s": (0.5 * scales.interval, 0.1 * scales.duration),
         "rad2/s": (1e-3 * per_step, 3.0 * per_step),
-        "rad/s": (10.0 / scales.duration, 5.0 * per_step),
+        "rad/s": (min(10.0 / scales.duration, 0.02 * per_step), 5.0 * per_step),
         "m": (0.01 * scales.size, scales.size),
         "m2/s": (1e-4 * scales.speed**2 * scales.interval, scales.speed**2 * scales.interval),
         "Hz": (0.02 * per_step, 2.0 * per_step),

@@ -99,7 +99,11 @@ def described(
     stated = replace(options, columns=dict(columns), box="none")
     raw = recording_of(TextSource(path, stated, layout), stated)
     known = {"bare_length_is_si": False, "bare_angle": False, "body_columns": None}
-    return replace(raw, **(known | facts))
+    columns_read = [
+        one | {"why": one["why"].replace("you named it", "a column of this format")}
+        for one in raw.columns
+    ]
+    return replace(raw, **(known | {"columns": columns_read} | facts))
 
 
 def side_by_side(

@@ -37,8 +37,8 @@ variables:
     time_in_class(source class) [s]: time spent in the class, over all runs
     rate({_RATE}) [s-1]: transitions over the time in their class
     rate_standard_error({_RATE}) [s-1]: standard error of the rate by the likelihood
-    rate_low({_RATE}) [s-1]: lower limit of the rate, Poisson, widened as far as they cluster
-    rate_high({_RATE}) [s-1]: upper limit of the rate, Poisson, widened as far as they cluster
+    rate_low({_RATE}) [s-1]: lower limit of the rate, Poisson, widened as far as events cluster
+    rate_high({_RATE}) [s-1]: upper limit of the rate, Poisson, widened as far as events cluster
     score(model) [1]: mean log likelihood of a held-out run; times in s
     score_behind(model) [1]: score less that of the best model
     score_behind_standard_error(model) [1]: its standard error over the runs
