@@ -116,6 +116,13 @@ def refuse_requests(app: Any, error: Exception | None) -> None:
             raise ExtensionError(f"{page} loads from elsewhere: {found[0]}")
 
 
+def search_without_previews(app: Any, name: str, *_: object) -> None:
+    """Leave the text below a hit out where the site is a folder: browsers fetch no files."""
+    if name == "search":
+        off = "DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false"
+        app.add_js_file(None, body=f'if (location.protocol === "file:") {off};')
+
+
 def setup(app: object) -> None:
     """Make the pages of the Python names, and the table of contents of the front page's links."""
     write_pages()
@@ -124,3 +131,4 @@ def setup(app: object) -> None:
     app.connect("build-finished", refuse_requests)  # type: ignore[attr-defined]
     app.connect("source-read", command_pages.move_links)  # type: ignore[attr-defined]
     app.connect("source-read", add_contents)  # type: ignore[attr-defined]
+    app.connect("html-page-context", search_without_previews)  # type: ignore[attr-defined]

@@ -147,7 +147,7 @@ def _code(name: str, found: Any) -> str:
     text = signature_of(name, found)
     if inspect.isclass(found):
         text = f"{bases_of(found)} {text or name}"
-    return f"```text\n{text}\n```"
+    return f"```python\n{text}\n```"
 
 
 def _members(found: type) -> list[tuple[str, Any]]:
@@ -166,7 +166,7 @@ def _member(owner: str, name: str, value: Any) -> str:
     text = as_markdown(inspect.getdoc(value) or "")
     if not inspect.isfunction(value):
         return f"{heading}\n\n{text}"
-    return f"{heading}\n\n```text\n{signature_of(name, value)}\n```\n\n{text}"
+    return f"{heading}\n\n```python\n{signature_of(name, value)}\n```\n\n{text}"
 
 
 def _is_documented(found: Any) -> bool:

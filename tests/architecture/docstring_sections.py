@@ -65,7 +65,7 @@ def _text(text: str) -> str:
 def _entry(entry: tuple[str, str]) -> str:
     head, description = entry
     name, colon, kind = head.partition(" : ")
-    shown = f"`{name}` : {_kind(kind)}" if colon else f"`{head}`"
+    shown = f"**`{name}`** : {_kind(kind)}" if colon else f"`{head}`"
     if not description:
         return f"- {shown}"
     return f"- {shown}\\\n{textwrap.indent(_text(description), '  ')}"

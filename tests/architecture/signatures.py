@@ -94,6 +94,6 @@ def _value(default: Any) -> str:
     if isinstance(default, enum.Enum):
         return f"{type(default).__name__}.{default.name}"
     if callable(default):
-        return getattr(default, "__name__", "…").replace("<lambda>", "…")
+        return getattr(default, "__name__", "...").replace("<lambda>", "...")
     text = repr(default)
-    return "…" if text.startswith("<") or " at 0x" in text or len(text) > _LONG else text
+    return "..." if text.startswith("<") or " at 0x" in text or len(text) > _LONG else text

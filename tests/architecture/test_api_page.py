@@ -73,7 +73,7 @@ def test_a_page_has_every_part_of_a_docstring(pages: dict[str, str]) -> None:
         "load(\n    path: str | PathLike[str] | pd.DataFrame | Mapping[str, Any] "
         "| npt.NDArray[Any] | Any,\n    *,\n    format: str | None = None,\n",
         ") -> xr.Dataset\n",
-        "- `start, stop` : `float`, optional\\\n  First and last time to keep [s]",
+        "- **`start, stop`** : `float`, optional\\\n  First and last time to keep [s]",
         "**Returns**\n\n- `xarray.Dataset`\\\n  Dimensions (time, body)",
         "- `FormatError`\\\n  When the file cannot be read; with line and column.",
         '>>> load(str(recording), tank="circle:30cm", block="3cm").sizes["time"]\n18001\n```',
@@ -130,11 +130,11 @@ It keeps the order:
 
 **Parameters**
 
-- `a, b` : `{"x", "y"}`, optional\\
+- **`a, b`** : `{"x", "y"}`, optional\\
   One:
 
       x
-- `first` : `array_like`, shape (n, 2)\\
+- **`first`** : `array_like`, shape (n, 2)\\
   Two lines
   of text.
 

@@ -122,6 +122,17 @@ def test_a_page_of_each_sort_of_the_built_site(visit: Callable[..., Visit], sche
             check_readable(one.page)
 
 
+def test_a_search_of_the_built_site_opened_from_a_file(visit: Callable[..., Visit]) -> None:
+    """A browser refuses to fetch a file, so the theme's preview of each hit must not ask for it."""
+    if not (BUILT / "index.html").exists():
+        pytest.skip("no site: run `make site`")
+    one = visit(BUILT.as_uri(), viewport=PHONE)
+    one.page.goto(f"{BUILT.as_uri()}/search.html?q=drag")
+    one.page.locator("ul.search a").nth(5).wait_for()
+    assert one.page.locator("ul.search .context").count() == 0
+    check_readable(one.page)
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_report_begins_with_its_answer(
     visit: Callable[..., Visit], report: Path, scheme: str
