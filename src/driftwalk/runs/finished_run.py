@@ -102,15 +102,20 @@ class FoundRun:
         verdict = stored_verdict(self.found)
         if verdict is not None and not verdict.explains:
             said += [f"of the {self.words}: {verdict.word}: {text}" for text in verdict.reasons]
-        if "flow_force_std" in self.found:
-            first = str(self.found["flow"].values[0])
-            said.append(
-                f"of the {self.words}: each flow has its own σ_F; that of flow {first} is taken "
-                "for all (`flow_settings` gives the others)"
-            )
+        said += [] if self.first_force is None else [self.first_force]
         left_out = self.found.attrs.get("flow_strength_left_out")
         said += [] if left_out is None else [f"of the {self.words}: {left_out}"]
         return said
+
+    @property
+    def first_force(self) -> str | None:
+        """The one of `warnings` on σ_F of the first flow in all, None where flows have one σ_F."""
+        if "flow_force_std" not in self.found:
+            return None
+        return (
+            f"of the {self.words}: each flow has its own σ_F; that of flow "
+            f"{self.found['flow'].values[0]} is taken for all (`flow_settings` gives the others)"
+        )
 
     @property
     def faults(self) -> list[str]:

@@ -97,8 +97,9 @@ def plan(
     strengths = vary_strengths(vary or [])
     seed = sources[0].study.assembly.seed
     names = [run.name if len(sources) > 1 else "" for run in runs or [Path()]]
+    taken = [settings_of(one, name, flow) for one, name in zip(sources, names, strict=True)]
     modes = make_modes(
-        [each for one, name in zip(sources, names, strict=True) for each in settings_of(one, name)],
+        [each for settings, _ in taken for each in settings],
         flow_scales=strengths.get("flow-scale", [1.0]),
         force_stds=strengths.get("force-std", []),
         seed=seed,
@@ -110,10 +111,7 @@ def plan(
     }
     wanted = Wanted(target, by, every, latency, missed, dwell)
     work = ControlPlanWork(modes, wanted, rounds, worlds, seed, inputs)
-    # Each flow of a fit has its own force here.
-    said = dict.fromkeys(
-        text for one in sources for text in one.warnings if "`flow_settings`" not in text
-    )
+    said = dict.fromkeys(text for _, warnings in taken for text in warnings)
     found: xr.Dataset = options.run(work, "control plan", warnings=[*said])
     print_result(found, options.out, json=options.json)
 
@@ -181,23 +179,32 @@ def run(
         print(json.dumps(line), flush=True)
 
 
-def settings_of(source: Source, name: str) -> list[ModeSource]:
-    """Return the setting of a run, or one for each flow of a fit whose pumps were switched."""
+def settings_of(source: Source, name: str, flow: Path | None) -> tuple[list[ModeSource], list[str]]:
+    """Return the setting of a run, or one for each flow of a fit with switches, and its warnings.
+
+    A given `flow` is taken in place of those of the fit.
+    """
     from driftwalk.assembly import ModeSource
+    from driftwalk.flow import stretch_flow
     from driftwalk.likelihood import flow_settings
     from driftwalk.model import apply_overrides
 
     study, fit = source.study, source.uncertainty
-    if fit is None or "flow" not in fit.dims or "time" not in source.flow.dims:
-        return [ModeSource(study, source.flow, fit, name)]
+    steady = "time" not in source.flow.dims
+    if fit is None or flow is not None or "flow" not in fit.dims or steady:
+        return [ModeSource(study, source.flow, fit, name)], source.warnings
     key = "forces.force_std_N"
-    return [
+    larger = study.tank.diameter_m if "stretched_by" in source.flow.attrs else None
+    settings = [
         ModeSource(
-            apply_overrides(study, {key: own.study.forces.force_std_N}), own.flow, own.uncertainty,
+            apply_overrides(study, {key: own.study.forces.force_std_N}),
+            own.flow if larger is None else stretch_flow(own.flow, diameter=larger),
+            own.uncertainty,
             f"{name} {label}".strip(),
         )
         for label, own in flow_settings(fit).items()
-    ]  # fmt: skip
+    ]
+    return settings, [text for text in source.warnings if text != source.first_force]
 
 
 def vary_strengths(given: list[str]) -> dict[str, list[float]]:

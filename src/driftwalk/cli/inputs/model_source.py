@@ -64,6 +64,8 @@ class Source:
         Warnings for the user.
     not_drawn : str or None
         Why no parameters can be drawn from a run, None where they can or there is no run.
+    first_force : str or None
+        The one of `warnings` that does not hold where each flow of a fit has its own σ_F.
     """
 
     study: Study
@@ -72,6 +74,7 @@ class Source:
     inputs: dict[str, Path]
     warnings: list[str]
     not_drawn: str | None = None
+    first_force: str | None = None
 
 
 def assembly_source(
@@ -211,7 +214,8 @@ def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) 
     field, stretched = _in_tank(field, given, chosen)
     warnings = [*found.warnings, *_without_effect(given, chosen), *stretched]
     inputs = inputs | _table_of(chosen)
-    return Source(chosen, field, found.uncertainty, inputs, warnings, found.not_drawn)
+    drawn = (found.uncertainty, inputs, warnings, found.not_drawn, found.first_force)
+    return Source(chosen, field, *drawn)
 
 
 GLUED: Final = {
