@@ -73,9 +73,6 @@ class LeastPolicy(NamedTuple):
     """Largest relative change of the flow's strength in a part of the recording: as much as a fit
     names. In ten worlds whose flow grows or pulses by 2 %, C_d was off by 0 to 1 % (median), as in
     a steady one (studies/misfit, set sizes)."""
-    noise: float = 0.02
-    """Relative change of sigma_F from place to place or from time to time (rms): a fifth of the
-    error from which the study of the verdict calls a number wrong."""
 
 
 LARGEST: Final = LargestPolicy()
@@ -359,8 +356,6 @@ def noise_criterion(spread: Spread, layout: Layout, *, by: str) -> Criterion:
         f"the noise is not the same everywhere: {at} the mean square of the errors of prediction "
         f"is {spread.ratio[worst]:.2f} of the overall one, expected 1 ± {spread.std[worst]:.2f}",
         detectable_sigmas(0.5 * VERDICT.level / known.size) * float(np.median(spread.std[known])),
-        size=spread.force_change,
-        least=LEAST.noise,
     )
 
 
