@@ -111,6 +111,8 @@ class Criterion(NamedTuple):
     """Size of the misfit itself, where a small one does not matter."""
     least: float = 0.0
     """Size up to which a misfit does not matter."""
+    measure: str = ""
+    """A format that names the two sizes in words."""
 
     @property
     def words(self) -> str:
@@ -129,13 +131,11 @@ class Criterion(NamedTuple):
 
     @property
     def note(self) -> str | None:
-        """The finding where it is surely there, but too small to matter."""
+        """The finding where it is sure, but too small to change the verdict."""
         if self.failed or not self.p_value < VERDICT.level:
             return None
-        return (
-            f"surely there, but too small to matter ({self.size:.2g}, up to {self.least:.2g} would "
-            f"not): {self.sentence}"
-        )
+        sizes = self.measure.format(self.size, self.least)
+        return f"too small to change the verdict: {sizes} is tolerated; {self.sentence}"
 
 
 def components_of(count: int) -> tuple[str, ...]:
@@ -312,6 +312,7 @@ def strength_criterion(trend: Trend, layout: Layout) -> Criterion:
         LARGEST.strength,
         float(np.abs(trend.change[known]).max()),
         LEAST.strength,
+        "the strength of the flow differs by {:.1%}, up to {:.0%}",
     )
 
 
@@ -380,6 +381,7 @@ def motion_criterion(motion: MotionComparison | None, *, angle: str) -> Criterio
         LARGEST.ks_distance if motion.far else math.inf,
         float(motion.drawn_distance.mean()),
         LEAST.ks_distance,
+        "the KS distance of the steps is {:.2f}, up to {:.2f}",
     )
 
 

@@ -267,7 +267,7 @@ def with_verdict(fit: xr.Dataset, check: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         The `fit`, with ``verdict``, ``verdict_reason`` (sentences), ``p_value`` by criterion and
         the residuals by cell. A warning that is a reason of the verdict is left out, and a misfit
-        that is surely there but too small to matter is a warning.
+        that is sure but too small to change the verdict is a warning.
     """
     kept = check[["verdict", "verdict_reason", "p_value", *BY_CELL]].rename(PLACES)
     rest = [
