@@ -17,6 +17,8 @@ from driftwalk.page.sections.check import LOOKS_FOR
 from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.recovery import recovery_sections
 from driftwalk.schema.answers.facts import facts_of
+from driftwalk.schema.answers.fit import checked_parts
+from driftwalk.schema.answers.parts import Table
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +103,18 @@ def test_the_check_of_a_fit(sections: list[dict[str, Any]]) -> None:
         assert values(simulated["x"]).size == values(simulated["y"]).size + 1
         assert values(simulated["low"]).tolist() == [0.9] * 6
         assert values(real["y"]).tolist() == [1.0] * 6
+
+
+def test_a_criterion_that_was_excused_is_marked() -> None:
+    """On the page and in the answer: its p value alone would contradict the verdict."""
+    check = made_up_check()
+    check["failed"].values[1] = 0
+    part = part_of(fit_sections(None, check=check), "check")
+    table = checked_parts(made_up_fit(), check)[-1]
+    assert isinstance(table, Table)
+    for rows in (part["rows"], table.rows):
+        assert [row[0] for row in rows] == ["autocorrelation", "flow_change: small"]
+    assert "'small'" in part["note"]
 
 
 def test_a_tenth_that_the_fit_absorbed_has_no_point() -> None:

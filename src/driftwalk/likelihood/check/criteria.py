@@ -73,9 +73,6 @@ class LeastPolicy(NamedTuple):
     """Largest relative change of the flow's strength in a part of the recording: as much as a fit
     names. In ten worlds whose flow grows or pulses by 2 %, C_d was off by 0 to 1 % (median), as in
     a steady one (studies/misfit, set sizes)."""
-    noise: float = 0.02
-    """Relative change of sigma_F from place to place or from time to time (rms): a fifth of the
-    error from which the study of the verdict calls a number wrong."""
 
 
 LARGEST: Final = LargestPolicy()
@@ -114,6 +111,8 @@ class Criterion(NamedTuple):
     """Size of the misfit itself, where a small one does not matter."""
     least: float = 0.0
     """Size up to which a misfit does not matter."""
+    measure: str = ""
+    """A format that names the two sizes in words."""
 
     @property
     def words(self) -> str:
@@ -132,13 +131,11 @@ class Criterion(NamedTuple):
 
     @property
     def note(self) -> str | None:
-        """The finding where it is surely there, but too small to matter."""
+        """The finding where it is sure, but too small to change the verdict."""
         if self.failed or not self.p_value < VERDICT.level:
             return None
-        return (
-            f"surely there, but too small to matter ({self.size:.2g}, up to {self.least:.2g} would "
-            f"not): {self.sentence}"
-        )
+        sizes = self.measure.format(self.size, self.least)
+        return f"too small to change the verdict: {sizes} is tolerated; {self.sentence}"
 
 
 def components_of(count: int) -> tuple[str, ...]:
@@ -315,6 +312,7 @@ def strength_criterion(trend: Trend, layout: Layout) -> Criterion:
         LARGEST.strength,
         float(np.abs(trend.change[known]).max()),
         LEAST.strength,
+        "the strength of the flow differs by {:.1%}, up to {:.0%}",
     )
 
 
@@ -359,8 +357,6 @@ def noise_criterion(spread: Spread, layout: Layout, *, by: str) -> Criterion:
         f"the noise is not the same everywhere: {at} the mean square of the errors of prediction "
         f"is {spread.ratio[worst]:.2f} of the overall one, expected 1 ± {spread.std[worst]:.2f}",
         detectable_sigmas(0.5 * VERDICT.level / known.size) * float(np.median(spread.std[known])),
-        size=spread.force_change,
-        least=LEAST.noise,
     )
 
 
@@ -385,6 +381,7 @@ def motion_criterion(motion: MotionComparison | None, *, angle: str) -> Criterio
         LARGEST.ks_distance if motion.far else math.inf,
         float(motion.drawn_distance.mean()),
         LEAST.ks_distance,
+        "the KS distance of the steps is {:.2f}, up to {:.2f}",
     )
 
 

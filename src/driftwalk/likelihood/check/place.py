@@ -244,14 +244,6 @@ class Spread(NamedTuple):
     """NaN where there are too few samples."""
     std: Floats
     """Standard deviation of the ratio if it is one."""
-    share: Floats
-    """Of the errors that are in the group."""
-
-    @property
-    def force_change(self) -> float:
-        """Root mean square of the relative change of sigma_F, without what chance makes of it."""
-        square = self.share * ((self.ratio - 1.0) ** 2 - self.std**2)
-        return 0.5 * float(np.sqrt(max(np.nansum(square), 0.0)))
 
 
 def spread_of(errors: Sequence[Innovations], groups: Sequence[Integers], size: int) -> Spread:
@@ -266,9 +258,9 @@ def spread_of(errors: Sequence[Innovations], groups: Sequence[Integers], size: i
     total = np.bincount(group, square, minlength=size)
     ratio[enough] = total[enough] / count[enough] / mean
     # The mean of all is made of the groups as well.
-    share = count / max(square.size, 1)
-    std[enough] = float(square.std()) / mean * np.sqrt((1.0 - share[enough]) / count[enough])
-    return Spread(ratio, std, share)
+    share = 1.0 - count[enough] / max(square.size, 1)
+    std[enough] = float(square.std()) / mean * np.sqrt(share / count[enough])
+    return Spread(ratio, std)
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,7 @@ from driftwalk.page.parts import (
     value_of,
 )
 from driftwalk.plot.model_check import BAND_STDS, LEAST_TOP, running_time
+from driftwalk.schema.answers.fit import marked_criteria
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,18 +81,20 @@ def check_sections(check: xr.Dataset) -> list[Section]:
 
 def _criteria(check: xr.Dataset) -> Section:
     require(check, "criterion", "p_value", "failed", "detectable", "detectable_of")
-    columns = ("criterion", "p_value", "failed", "detectable", "detectable_of")
+    columns = (check[one].values for one in ("criterion", "p_value", "detectable", "detectable_of"))
     rows = [
         [
-            f"{name}{': failed' if failed else ''}",
+            marked,
             LOOKS_FOR.get(str(name), ""),
             number(p),
             f"{size:.2g}: {of}" if isfinite(size) else "–",
         ]
-        for name, p, failed, size, of in zip(*(check[one].values for one in columns), strict=True)
+        for marked, name, p, size, of in zip(marked_criteria(check), *columns, strict=True)
     ]
     level = value_of(check, "level")
     note = "" if level is None else f"A test fails where its p value is below {level:.3g}."
+    if any(row[0].endswith(": small") for row in rows):
+        note += " Where it says 'small', the misfit is too small to change the verdict."
     heads = ["test", "what it looks for", "p value", "found nine times in ten"]
     return table_section("", "", heads, rows, note)
 

@@ -194,13 +194,23 @@ def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
     parts.append(Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{more}"))
     chance = float(check.attrs.get("ks_p_value", "nan"))
     parts += [Row("  p-value", f"{chance:.2g}")] if isfinite(chance) else []
-    columns = ("criterion", "p_value", "detectable", "detectable_of")
+    columns = (check[one].values for one in ("p_value", "detectable", "detectable_of"))
     rows = [
-        [str(name), *(f"{one:.2g}" if isfinite(one) else "–" for one in (p, size)), str(of)]
-        for name, p, size, of in zip(*(check[one].values for one in columns), strict=True)
+        [name, *(f"{one:.2g}" if isfinite(one) else "–" for one in (p, size)), str(of)]
+        for name, p, size, of in zip(marked_criteria(check), *columns, strict=True)
     ]
     heads = ["criterion", "p value", "misfit found in 9 of 10", "of what"]
     return [*parts, Table(rows, heads, "criteria of the check")]
+
+
+def marked_criteria(check: xr.Dataset) -> list[str]:
+    """Return the names of the criteria of a check with ": failed", or ": small" where excused."""
+    level = check.attrs.get("level", 0.0)
+    columns = (check[one].values for one in ("criterion", "p_value", "failed"))
+    return [
+        f"{name}{': failed' if failed else ': small' if p < level else ''}"
+        for name, p, failed in zip(*columns, strict=True)
+    ]
 
 
 def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]:
@@ -267,7 +277,7 @@ def with_verdict(fit: xr.Dataset, check: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         The `fit`, with ``verdict``, ``verdict_reason`` (sentences), ``p_value`` by criterion and
         the residuals by cell. A warning that is a reason of the verdict is left out, and a misfit
-        that is surely there but too small to matter is a warning.
+        that is sure but too small to change the verdict is a warning.
     """
     kept = check[["verdict", "verdict_reason", "p_value", *BY_CELL]].rename(PLACES)
     rest = [

@@ -86,7 +86,7 @@ variables:
     part_end(part) [s]: end of the part
     speed_low(speed_range) [m s-1]: lower end of the range
     speed_high(speed_range) [m s-1]: upper end of the range
-variables (a misfit is surely there, but too small to matter):
+variables (a misfit is sure, but too small to change the verdict):
     note(note) text: the misfit, in a sentence
 variables ({_COMPARED}):
     ks_to_estimate(replicate) [1]: KS distance of the recording to replicates at the estimate

@@ -351,7 +351,9 @@ def test_steps_that_differ_are_put_into_words() -> None:
     assert "orientations" not in found["given"].sentence
     # However sure, a difference that does not matter is no finding.
     assert found["given"].size == pytest.approx(motion.drawn_distance.mean())
-    assert not found["given"]._replace(size=0.09).failed
+    small = found["given"]._replace(size=0.09)
+    assert not small.failed
+    assert "the KS distance of the steps is 0.09, up to 0.10 is tolerated" in (small.note or "")
     assert not motion_criterion(None, angle="given").failed
 
 
@@ -400,20 +402,17 @@ def test_a_change_of_the_flow_that_is_sure_but_small_is_a_note(largest: float) -
     assert found.p_value == pytest.approx(chi2.sf((largest / 5e-4) ** 2, 9))
     small = largest < 0.02
     assert found.failed is not small
-    assert (found.note or "").startswith("surely there, but too small to matter") is small
+    said = "too small to change the verdict: the strength of the flow differs by 0.4%, up to 2% is"
+    assert (found.note or "").startswith(said) is small
     assert "between 180 s and 240 s it is" in found.sentence
 
 
-def test_noise_that_differs_surely_but_little_is_a_note() -> None:
-    """Ten equal parts of 60,000 errors each: the mean of all has a standard error of 0.2 %."""
-    share, std = np.full(10, 0.1), np.full(10, 2e-3)
-    ratio = 1.0 + 0.03 * np.array([1, -1, *[0] * 8])
-    found = noise_criterion(Spread(ratio, std, share), ten_parts(), by="time")
-    # A fifth of the parts is off by 3 %, so the root mean square of sigma_F by 0.67 %.
-    assert found.size == pytest.approx(0.5 * np.sqrt(0.2 * 0.03**2 - 2e-3**2))
-    assert found.note is not None
-    worse = noise_criterion(Spread(1.0 + 5 * (ratio - 1.0), std, share), ten_parts(), by="time")
-    assert worse.failed
-    assert worse.note is None
-    nothing = noise_criterion(Spread(np.ones(10), std, share), ten_parts(), by="time")
-    assert nothing.note is None
+def test_noise_that_differs_surely_fails_however_little() -> None:
+    """At 30 Hz a force of 0.45 mN, then 0.65 mN: the rest of an error is the camera's 0.3 mm.
+
+    Mean squares from Riccati's and Lyapunov's equations of a block of 11.6 g, along one axis.
+    """
+    std, ratio = np.full(10, 5e-3), np.repeat([0.961, 1.039], 5)
+    found = noise_criterion(Spread(ratio, std), ten_parts(), by="time")
+    assert (found.failed, found.note) == (True, None)
+    assert not noise_criterion(Spread(np.ones(10), std), ten_parts(), by="time").failed
