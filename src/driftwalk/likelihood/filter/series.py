@@ -438,11 +438,14 @@ def _reach(block: Block) -> float:
 
 
 def usable_intervals(series: Sequence[Series]) -> int:
-    """Return the number of intervals that are not left out and not longer than a gap."""
-    return sum(
-        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= FILTER.longest_gap_s)))
-        for one in series
-    )
+    """Return the number of intervals that are not left out, no gaps, and not next after one."""
+    count = 0
+    for one in series:
+        gaps = np.diff(one.time) > FILTER.longest_gap_s
+        left_out = gaps | (one.excluded[1:] != 0)
+        left_out[1:] |= gaps[:-1]
+        count += int(np.count_nonzero(~left_out))
+    return count
 
 
 def body_of(study: Study, used_angle: str) -> Body:
