@@ -13,7 +13,7 @@ from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.difference_pairs import Pair
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
-from driftwalk.likelihood.filter.series import Series, strength_of
+from driftwalk.likelihood.filter.series import Series, gaps_unsettled, strength_of
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.newton import inverse, limited, newton_step
 from driftwalk.likelihood.preparation import body_of, estimate_of, series_of
@@ -257,6 +257,9 @@ def test_after_a_gap_two_samples_give_the_velocity_and_no_drag_does(
     found = [passes.run(series, one) for one in (point, replace(point, log_drag=math.log(5.0)))]
     for one in found:
         assert one["used"][gap : gap + 2].tolist() == [0, 0]
+    # Two stretches of three seconds; without the gap, one.
+    assert "1 in all, and 2.9 s" in gaps_unsettled([series])
+    assert gaps_unsettled([passes.series[0]]) == ""
     step = series.time[gap + 1] - series.time[gap]
     q, noise = math.exp(point.log_intensity), math.exp(2.0 * point.log_noise)
     drift = np.array([[1.0, step], [0.0, 1.0]])
