@@ -460,9 +460,9 @@ def gaps_unsettled(series: Sequence[Series]) -> str:
     if not gaps or mean >= FILTER.least_stretch_s:
         return ""
     return (
-        f"the track has gaps, {gaps} in all, and {mean:.2g} s between them: how the block moved before "
-        "each is lost, which makes C_d and the force too large; record the whole path of the "
-        f"block, or stretches of {FILTER.least_stretch_s:.0f} s and more"
+        f"the track has gaps, {gaps} in all, and {mean:.2g} s between them: how the block moved "
+        "before each is lost, which makes C_d and the force too large; record the whole path of "
+        f"the block, or stretches of {FILTER.least_stretch_s:.0f} s and more"
     )
 
 
