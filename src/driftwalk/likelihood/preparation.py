@@ -22,6 +22,7 @@ from driftwalk.likelihood.filter.series import (
     ORIENTED_SHARE,
     Series,
     body_of,
+    gaps_unsettled,
     series_of,
     usable_intervals,
     wall_intervals,
@@ -156,7 +157,9 @@ class PreparedRecordings:
     def facts(self) -> dict[str, Any]:
         """Facts of a fit on its recordings."""
         many = self.recordings
+        gaps = gaps_unsettled(self.series)
         return {
+            **({"gaps_unsettled": gaps} if gaps else {}),
             "wall_share": self.wall_share,
             "angle": self.angle if self.study.block.body().symmetry else NO_HEADING,
             "samples": self.samples,

@@ -13,7 +13,7 @@ from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.difference_pairs import Pair
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
-from driftwalk.likelihood.filter.series import Series, strength_of
+from driftwalk.likelihood.filter.series import Series, gaps_unsettled, strength_of
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.newton import inverse, limited, newton_step
 from driftwalk.likelihood.preparation import body_of, estimate_of, series_of
@@ -237,6 +237,41 @@ def test_the_first_errors_of_a_stretch_are_small_and_are_not_counted() -> None:
     assert (white[first] ** 2).mean() < 0.7
     count = int(later.sum())
     assert abs((white[later] ** 2).mean() - 1.0) < 5.0 * math.sqrt(2.0 / (3.0 * count))
+
+
+def test_after_a_gap_two_samples_give_the_velocity_and_no_drag_does(
+    passes: Passes, point: Point
+) -> None:
+    """Against the normal law of free motion: v ~ N(0, 0.1 m/s), and z = x + v t + noise.
+
+    The second sample does not count. Counted, it asked for C_d 5 to 7 where 0.45 is true, in tracks
+    with 140 gaps: such a drag makes any velocity the water's.
+    """
+    series = passes.series[0].part(0, 60)
+    gap = 30
+    series = replace(
+        series,
+        time=series.time + 5.0 * (np.arange(60) >= gap),
+        excluded=np.zeros(60, dtype=np.uint8),
+    )
+    found = [passes.run(series, one) for one in (point, replace(point, log_drag=math.log(5.0)))]
+    for one in found:
+        assert one["used"][gap : gap + 2].tolist() == [0, 0]
+    # Two stretches of three seconds; without the gap, one.
+    assert "1 in all, and 2.9 s" in gaps_unsettled([series])
+    assert gaps_unsettled([passes.series[0]]) == ""
+    step = series.time[gap + 1] - series.time[gap]
+    q, noise = math.exp(point.log_intensity), math.exp(2.0 * point.log_noise)
+    drift = np.array([[1.0, step], [0.0, 1.0]])
+    push = q * np.array([[step**3 / 3.0, step**2 / 2.0], [step**2 / 2.0, step]])
+    before = drift @ np.diag([noise, 0.01]) @ drift.T + push
+    gain = before[:, 0] / (before[0, 0] + noise)
+    for axis, place in enumerate((series.x, series.y)):
+        moved = place[gap + 1] - place[gap]
+        wanted = np.array([place[gap], 0.0]) + gain * moved
+        for one in found:
+            velocity = axis + one["state"].shape[1] // 2
+            np.testing.assert_allclose(one["state"][gap + 1, [axis, velocity]], wanted, rtol=1e-9)
 
 
 COLUMNS = ("x", "y", "theta", "omega", "angle")

@@ -85,6 +85,7 @@ private:
     const std::int64_t k = state_.next;
     if (state_.open && track_.time[k] - state_.seen > problem_.longest_gap) {
       state_.open = false;
+      state_.restarted = true;
     }
     if (out_.errors != nullptr) {
       for (int a = 0; a < size; ++a) {
@@ -120,7 +121,7 @@ private:
   }
 
   void open(const Sample& found, const double* velocity) {
-    state_ = {{}, {}, state_.seen, true, 0, state_.next};
+    state_ = {{}, {}, state_.seen, true, 0, state_.next, state_.restarted};
     for (int a = 0; a < D; ++a) {
       state_.mean[a] = found.value[a];
       state_.mean[a + D] = velocity[a];
@@ -173,7 +174,9 @@ private:
     if constexpr (F == 2) {
       add_half_push(middle, h / 2);
     }
-    const DragResponse<D> drag = response_at(middle, k, share);
+    // Of any velocity the mean drag is far too large. Until a sample gives one, nothing drags.
+    const DragResponse<D> drag =
+        state_.restarted ? DragResponse<D>{} : response_at(middle, k, share);
     Kick<D> kick = make_kick(drag, h);
     for (int a = 0; a < D; ++a) {
       state_.mean[a + D] += kick.change[a];
@@ -305,7 +308,9 @@ private:
         innovation_of(state_, found.value, found.variance, problem_.time_variance);
     const bool fits = e.chi_squared() < outlier_chi_squared;
     write_innovation(row, e);
-    write_likelihood(row, fits && !excluded ? &e : nullptr);
+    // The first innovation after a gap tells of the velocity at its end alone, of which no law is
+    // assumed: counted, it would ask for the drag that makes any velocity the water's.
+    write_likelihood(row, fits && !excluded && !state_.restarted ? &e : nullptr);
     if (!fits && !excluded) {
       if (++state_.outliers <= most_outliers) {
         return;
@@ -323,6 +328,7 @@ private:
       return;
     }
     state_.outliers = 0;
+    state_.restarted = state_.restarted && excluded;
     const Gain<D, F> gain = gain_of(state_, e);
     update(state_, e, gain);
     if (with_sensitivities()) {

@@ -107,6 +107,7 @@ struct FilterState {
   bool open;         // whether there is a state at all
   int outliers;      // samples in a row that were no noise
   std::int64_t next; // the sample that comes next
+  bool restarted;    // after a gap, and no sample has given a velocity since
 };
 
 // The part of one strip in d(acceleration)/d(coefficients).

@@ -63,6 +63,7 @@ def verdict_on(fit: xr.Dataset, criteria: Sequence[Criterion], *, study: Study) 
         ),
         *_told(fit, "law_unsettled"),
         *_told(fit, "flow_modes_unsettled"),
+        *_told(fit, "gaps_unsettled"),
     ]
     return verdict_of(against, unable)
 

@@ -34,6 +34,9 @@ class FilterPolicy(NamedTuple):
     longest_gap_s: float = 1.0
     """Longest gap that is predicted over [s]; the filter restarts after a longer one. Chosen by
     hand."""
+    least_stretch_s: float = 10.0
+    """Mean length of the stretches between gaps below which C_d is not settled [s]. Chosen by hand:
+    a few times as long as a block remembers its velocity. At 2 s C_d came out 23 % too large."""
     settling_samples: int = 3
     """Samples after the first one of a stretch until the filter knows the velocity. Its innovations
     are a hundredth to four fifths of what it expects there; when they counted, six of 42 recordings
@@ -438,10 +441,28 @@ def _reach(block: Block) -> float:
 
 
 def usable_intervals(series: Sequence[Series]) -> int:
-    """Return the number of intervals that are not left out and not longer than a gap."""
-    return sum(
-        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= FILTER.longest_gap_s)))
-        for one in series
+    """Return the number of intervals that are not left out, no gaps, and not next after one."""
+    count = 0
+    for one in series:
+        gaps = np.diff(one.time) > FILTER.longest_gap_s
+        left_out = gaps | (one.excluded[1:] != 0)
+        left_out[1:] |= gaps[:-1]
+        count += int(np.count_nonzero(~left_out))
+    return count
+
+
+def gaps_unsettled(series: Sequence[Series]) -> str:
+    """Return why gaps leave C_d unsettled; nothing where the stretches between them are long."""
+    steps = [np.diff(one.time) for one in series]
+    gaps = sum(int(np.count_nonzero(one > FILTER.longest_gap_s)) for one in steps)
+    seen = sum(float(one[one <= FILTER.longest_gap_s].sum()) for one in steps)
+    mean = seen / (gaps + len(steps))
+    if not gaps or mean >= FILTER.least_stretch_s:
+        return ""
+    return (
+        f"the track has gaps, {gaps} in all, and {mean:.2g} s between them: how the block moved "
+        "before each is lost, which makes C_d and the force too large; record the whole path of "
+        f"the block, or stretches of {FILTER.least_stretch_s:.0f} s and more"
     )
 
 
