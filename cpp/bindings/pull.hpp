@@ -5,7 +5,9 @@
 
 #include "driftwalk/assembly/pull_rules.hpp"
 
+#include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <vector>
 
 class Pull {
@@ -54,6 +56,16 @@ public:
                        high};
   }
 
+  // Squares of lengths [m^2]; see `Multipoles`.
+  void set_multipoles(In<double, 1> coefficient, double softening, double fading, double end) {
+    driftwalk::Multipoles& far = rules_.multipoles;
+    if (coefficient.size() != std::size(far.coefficient)) {
+      throw std::invalid_argument("multipoles have six coefficients");
+    }
+    far = {.on = true, .softening = softening, .fading = fading, .end = end};
+    std::copy_n(coefficient.data(), coefficient.size(), far.coefficient);
+  }
+
   const driftwalk::PullRules& rules() const { return rules_; }
 
 private:
@@ -73,5 +85,7 @@ inline void register_pull(nb::module_& module) {
            "pole"_a, "like_poles_repel"_a)
       .def("set_radial", &Pull::set_radial, "what"_a, "cells"_a, "first"_a)
       .def("set_oriented", &Pull::set_oriented, "coefficient"_a, nb::kw_only(), "first"_a,
-           "per_step"_a, "low"_a, "high"_a);
+           "per_step"_a, "low"_a, "high"_a)
+      .def("set_multipoles", &Pull::set_multipoles, "coefficient"_a, nb::kw_only(), "softening"_a,
+           "fading"_a, "end"_a);
 }

@@ -8,8 +8,10 @@
 #include "driftwalk/stats/ks2d_permutation.hpp"
 #include "driftwalk/stats/steps.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
+#include <iterator>
 #include <memory>
 #include <numeric>
 #include <string>
@@ -259,6 +261,13 @@ void set_oriented(Pull* pull, const double* coefficient, int distances, int angl
                   double per_step, double low, double high) {
   pull->oriented.assign(coefficient, coefficient + distances * angles * angles);
   pull->rules.oriented = {pull->oriented.data(), distances, angles, first, per_step, low, high};
+}
+EXPORT(set_multipoles)
+void set_multipoles(Pull* pull, const double* coefficient, double softening, double fading,
+                    double end) {
+  Multipoles& far = pull->rules.multipoles;
+  far = {.on = true, .softening = softening, .fading = fading, .end = end};
+  std::copy_n(coefficient, std::size(far.coefficient), far.coefficient);
 }
 
 // Steps between positions at equal times: lengths and turning angles of `count` positions at most.

@@ -148,6 +148,9 @@ class Pull:
     def set_oriented(
         self, coefficient: _Floats, *, first: float, per_step: float, low: float, high: float
     ) -> None: ...
+    def set_multipoles(
+        self, coefficient: _Floats, *, softening: float, fading: float, end: float
+    ) -> None: ...
 
 def place_blocks(
     model: Model,

@@ -9,6 +9,7 @@ import magpylib
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.ndimage import map_coordinates
 from scipy.special import k0, k1
 
 import driftwalk as dw
@@ -174,6 +175,52 @@ def test_a_conservative_pair_keeps_energy_and_momentum(tmp_path: Path) -> None:
         np.testing.assert_allclose([*momentum, spin], 0.0, atol=1e-13)
         tank.advance(0.25)
     assert max(kinetics) > 1e-7
+    assert np.ptp(totals) < 1e-3 * max(kinetics)
+
+
+@pytest.mark.slow
+def test_fixed_poles_keep_energy_through_their_table_and_beyond() -> None:
+    # 5000 steps of two blocks that repel each other, from inside the table to beyond the cut-off.
+    pair = still_pair(
+        [[0.0, 0.0, 0.1], [0.038, 0.012, 0.4]],
+        interaction={"magnets": "5x5x2mm,1.3T", "poles": "fixed"},
+        assembly={"faces": "N,N,N,N"}, simulation={"time_step_s": 1e-3},
+    )  # fmt: skip
+    tank, pull = dw.LiveTank(**pair), block_pull(pair["study"])
+    assert pull is not None
+    far, near = pull.tables.multipoles, pull.tables.oriented
+    assert far is not None
+    assert near is not None
+
+    def potential() -> float:
+        turn = tank.theta[:, None] + np.arange(4) * np.pi / 2
+        x, y = (
+            tank.x[:, None] + pull.lever * np.cos(turn),
+            tank.y[:, None] + pull.lever * np.sin(turn),
+        )
+        dx, dy = x[1] - x[0, :, None], y[1] - y[0, :, None]
+        own = turn[0, :, None]
+        along, up = dx * np.cos(own) + dy * np.sin(own), dy * np.cos(own) - dx * np.sin(own)
+        angle = turn[1] + np.pi - own
+        total = far.energy(along, up, angle)
+        r, per_angle = np.hypot(along, up), near["coefficient"].shape[1] / (2 * np.pi)
+        places = (
+            (np.log(r) - near["first"]) * near["per_step"],
+            np.arctan2(up, along) * per_angle,
+            angle * per_angle,
+        )
+        inside = np.pad(near["coefficient"], ((0, 0), (90, 90), (90, 90)), mode="wrap")
+        places = (places[0], places[1] + 90, places[2] + 90)
+        table = map_coordinates(inside, places, order=2, prefilter=False, mode="nearest")
+        return -float((total + np.where(r < near["high"], table, 0.0)).sum())
+
+    totals, kinetics = [], []
+    for _ in range(100):
+        kinetic = MASS / 2 * (tank.vx**2 + tank.vy**2) + MASS * SIDE**2 / 12 * tank.omega**2
+        kinetics.append(float(kinetic.sum()))
+        totals.append(kinetics[-1] + potential())
+        tank.advance(0.1 if len(totals) > 50 else 0.01)
+    assert max(kinetics) > 1e-5
     assert np.ptp(totals) < 1e-3 * max(kinetics)
 
 

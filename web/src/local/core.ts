@@ -53,6 +53,7 @@ interface Exports {
     low: number,
     high: number,
   ): void;
+  set_multipoles(pull: Address, coefficient: Address, softening: number, fading: number, end: number): void;
   form_steps(x: Address, y: Address, count: number, length: Address, angle: Address): number;
   make_reference(x: Address, y: Address, count: number): Address;
   ks_distance(reference: Address, x: Address, y: Address, count: number): number;

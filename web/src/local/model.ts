@@ -58,6 +58,9 @@ const pullTables = object({
       high: number,
     }),
   ),
+  multipoles: nullable(
+    object({ coefficient: list(number), softening: number, fading: number, end: number }),
+  ),
 });
 
 const ARRAYS = ["u", "v", "frame_time", "edges", "panels", "corners", "moment_points"];
@@ -149,6 +152,12 @@ async function makePull(core: Core, content: unknown): Promise<Address> {
     const values = await doubles(coefficient);
     core.with([values], (at) =>
       core.call.set_oriented(pull, at, values.length / angles ** 2, angles, first, per_step, low, high),
+    );
+  }
+  if (tables.multipoles !== null) {
+    const { coefficient, softening, fading, end } = tables.multipoles;
+    core.with([Float64Array.from(coefficient)], (at) =>
+      core.call.set_multipoles(pull, at, softening, fading, end),
     );
   }
   return pull;

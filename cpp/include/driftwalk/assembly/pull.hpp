@@ -238,6 +238,75 @@ inline void pull_oriented(const PullRules& rules, T dx, T dy, Pulled<T>& a, Pull
   }
 }
 
+// Of multipoles; returns the least squared distance of two faces.
+template <class Real>
+inline Real pull_multipoles(const PullRules& rules, Real dx, Real dy, Pulled<Real>& a,
+                            Pulled<Real>& b) {
+  using T = typename Numbers<Real>::Scalar;
+  const auto number = [](double value) { return Real(static_cast<T>(value)); };
+  const Multipoles& far = rules.multipoles;
+  const Real lever = number(rules.lever), softening = number(far.softening);
+  const Real end = number(far.end), fading = number(far.fading);
+  const Real per_fade = number(1 / (far.end - far.fading));
+  Real c[6];
+  for (int k = 0; k < 6; ++k) {
+    c[k] = number(far.coefficient[k]);
+  }
+  const Real none = number(0), one = number(1), two = number(2), three = number(3);
+  const Real sign = number(rules.like_poles_repel ? -1 : 1);
+  turn_towards(dx, dy, a);
+  turn_towards(-dx, -dy, b);
+  const FacePoints<Real> first(a.axes, one), second(b.axes, one);
+  Real nearest = end;
+  for (int i = 0; i < 4; ++i) {
+    const Real from_x = dx - first.x[i] * lever, from_y = dy - first.y[i] * lever;
+    Real sum_x = none, sum_y = none;
+    for (int j = 0; j < 4; ++j) {
+      const Real x = from_x + second.x[j] * lever, y = from_y + second.y[j] * lever;
+      const Real squared = x * x + y * y, poles = a.pole[i] * (b.pole[j] * sign);
+      const auto acts = (squared < end) & (poles != none);
+      if (!any(acts)) {
+        continue;
+      }
+      nearest = min(nearest, select(acts, squared, end));
+      const Real hh = one / (squared + softening), hhh = hh * sqrt(hh);
+      const Real along = first.x[i] * x + first.y[i] * y, up = second.x[j] * x + second.y[j] * y;
+      // The energy counts the second's normal inwards.
+      const Real w = -(first.x[i] * second.x[j] + first.y[i] * second.y[j]), inward = -up;
+      const Real turned = first.y[i] * second.x[j] - first.x[i] * second.y[j];
+      const Real u = along * inward * hh, v = (along * along + up * up) * hh;
+      const Real by_w = c[0] + hh * (c[1] + c[2] * v), by_u = c[3] + hh * (c[4] + c[5] * v);
+      const Real by_v = hh * (c[2] * w + c[5] * u);
+      const Real energy = w * by_w + u * by_u;
+      // Minus twice the derivative by the squared distance, over h^5.
+      const Real steep = number(5) * energy + two * (u * by_u + v * by_v - w * c[0] - u * c[3]);
+      const Real part = min(max((squared - fading) * per_fade, none), one);
+      const Real felt = poles * hhh;
+      const Real scaled = felt * (one - part * part * (three - two * part));
+      const Real strength =
+          scaled * hh * steep + felt * energy * (number(12) * part * (one - part) * per_fade);
+      // The energy's derivatives by the way along the two normals, and by the cosine.
+      const Real per_way = scaled * hh;
+      const Real by_first = per_way * (inward * by_u + two * along * by_v);
+      const Real by_second = per_way * (along * by_u + two * inward * by_v);
+      const Real turning = scaled * by_w * turned;
+      const Real force_x = strength * x - by_first * first.x[i] + by_second * second.x[j];
+      const Real force_y = strength * y - by_first * first.y[i] + by_second * second.y[j];
+      sum_x = sum_x + force_x;
+      sum_y = sum_y + force_y;
+      a.torque = a.torque - turning - by_first * (first.x[i] * y - first.y[i] * x);
+      b.torque = b.torque + turning + by_second * (second.x[j] * y - second.y[j] * x) +
+                 lever * (second.x[j] * force_y - second.y[j] * force_x);
+    }
+    a.torque = a.torque - lever * (first.x[i] * sum_y - first.y[i] * sum_x);
+    a.force_x = a.force_x - sum_x;
+    a.force_y = a.force_y - sum_y;
+    b.force_x = b.force_x + sum_x;
+    b.force_y = b.force_y + sum_y;
+  }
+  return nearest;
+}
+
 // Calls `f` with each lane where a mask holds.
 template <class Bool, class F>
 inline void for_lanes(int lanes, const Bool& mask, const F& f) {
@@ -293,13 +362,21 @@ public:
     if (rules_.faces.cells > 0) {
       pull_faces(rules_, dx, dy, a, b);
     }
-    for (int pair = 0; pair < count_ && rules_.oriented.distances > 0; ++pair) {
-      Pulled<T> first, second;
-      move_lane(a, pair, first, 0);
-      move_lane(b, pair, second, 0);
-      pull_oriented(rules_, T(get(dx, pair)), T(get(dy, pair)), first, second);
-      move_lane(first, 0, a, pair);
-      move_lane(second, 0, b, pair);
+    if (rules_.oriented.distances > 0) {
+      const Real nearest =
+          rules_.multipoles.on ? pull_multipoles(rules_, dx, dy, a, b) : Real(T(0));
+      const Real high{static_cast<T>(rules_.oriented.high * rules_.oriented.high)};
+      for_lanes(lanes, nearest < high, [&](int pair) {
+        if (pair >= count_) {
+          return;
+        }
+        Pulled<T> first, second;
+        move_lane(a, pair, first, 0);
+        move_lane(b, pair, second, 0);
+        pull_oriented(rules_, T(get(dx, pair)), T(get(dy, pair)), first, second);
+        move_lane(first, 0, a, pair);
+        move_lane(second, 0, b, pair);
+      });
     }
     for (int pair = 0; pair < count_; ++pair) {
       give(a, pair, place_[0][pair]);

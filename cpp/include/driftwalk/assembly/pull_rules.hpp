@@ -24,6 +24,17 @@ struct OrientedTable {
   double low = 0, high = 0;       // distances between which it holds [m]
 };
 
+// Energy [J] of two faces with an axis each, as of dipoles and the next multipoles. With
+// h = 1 / sqrt(distance² + softening), p and q the way times h along the normals, w the cosine
+// between these, u = p q and v = p² + q² it is
+// h³ (w (c0 + c1 h² + c2 h² v) + u (c3 + c4 h² + c5 h² v)), led to 0 between two distances.
+struct Multipoles {
+  bool on = false;
+  double softening = 0;       // [m^2]
+  double coefficient[6] = {}; // c0 and c3 in J m^3, the others in J m^5
+  double fading = 0, end = 0; // squares of these distances [m^2]
+};
+
 struct PullRules {
   bool on = false;
   double reach = 0;              // blocks whose centres are farther apart feel nothing [m]
@@ -31,6 +42,7 @@ struct PullRules {
   RadialTable resistance;        // to closing or parting speed, per squared distance [N s/m^3]
   RadialTable faces;             // attraction between points of two faces, per distance [N/m]
   OrientedTable oriented;        // between the same points
+  Multipoles multipoles;         // and to this the table adds what is missing near by
   double lever = 0;              // of these points, from the centre of the block [m]
   double pole[4] = {1, 1, 1, 1}; // of the faces, in the block's own frame
   bool like_poles_repel = false;

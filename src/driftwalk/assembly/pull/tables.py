@@ -15,6 +15,7 @@ from driftwalk import _core
 from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.pull.magnets import coaxial_force, magnet_energy
 from driftwalk.assembly.pull.measured import MeasuredAttraction, read_attraction
+from driftwalk.assembly.pull.multipoles import MULTIPOLES, Energy, Multipoles, fit_multipoles
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.model.interaction import Interaction, Magnet
@@ -117,6 +118,8 @@ class PullTables(NamedTuple):
     """Cells of the forces of "centres", "resistance" and "faces", and the number of the first."""
     oriented: dict[str, Any] | None
     """Energy of two faces: its coefficients on (distance, direction, angle), and where they are."""
+    multipoles: Multipoles | None
+    """Energy of two faces in closed form, to which the one on (distance, ...) is added."""
 
     def native(self) -> _core.Pull:
         """Return the native core's form of the tables."""
@@ -127,6 +130,8 @@ class PullTables(NamedTuple):
             made.set_radial(what, cells, first)
         if self.oriented is not None:
             made.set_oriented(**self.oriented)
+        if self.multipoles is not None:
+            made.set_multipoles(**self.multipoles._asdict())
         return made
 
 
@@ -238,23 +243,25 @@ def _block_pull(
     if given.approach_resistance_N_s > 0.0:
         resistance = _approach(given.approach_resistance_N_s, side, mass, step)
     oriented: Energy | None = None
+    far: Multipoles | None = None
     end = 0.0 if faces is None else faces.cutoff
     if faces is not None and measured is not None and measured.is_oriented:
         oriented, end = measured.flat_below(faces.capped_at).energy, measured.farthest
     elif faces is not None and magnet is not None and given.poles == "fixed":
-        oriented = _fixed_poles(magnet, faces)
+        oriented, far = _fixed_poles(magnet, faces)
     reach = max(
         0.0 if faces is None else end + 2.0 * lever,
         *(0.0 if force is None else force.cutoff for force in (centres, resistance)),
     )
     radial: dict[str, RadialForce | None] = {"centres": centres, "resistance": resistance}
-    tables = PullTables(reach, lever, {}, None)
+    tables = PullTables(reach, lever, {}, None, far)
     if faces is not None and oriented is None:
         radial["faces"] = faces
     elif faces is not None and oriented is not None:
-        of_magnets = measured is None
+        if far is not None and magnet is not None:
+            end = min(end, max(MULTIPOLES.table * max(magnet[:3]), faces.capped_at / POLICY.taper))
         tables = tables._replace(
-            oriented=_oriented(oriented, faces.contact, end, of_magnets=of_magnets)
+            oriented=_oriented(oriented, faces.contact, end, of_magnets=far is not None)
         )
     tables.radial.update(
         {what: force.cells() for what, force in radial.items() if force is not None}
@@ -336,11 +343,11 @@ def _approach(factor: float, side: float, mass: float, step: float) -> RadialFor
     )
 
 
-Energy = Callable[[Floats, Floats, Floats], Floats]
+def _fixed_poles(magnet: Magnet, faces: RadialForce) -> tuple[Energy, Multipoles]:
+    """Return the energy of two faces with fixed magnets, as flat as the time step needs it.
 
-
-def _fixed_poles(magnet: Magnet, faces: RadialForce) -> Energy:
-    """Return the energy of two faces with fixed magnets, as flat as the time step needs it."""
+    In two parts: what is missing near by in the closed form, and this.
+    """
     nearest = max(faces.capped_at, 1.05 * magnet.thickness_m)
 
     def energy(x: Floats, y: Floats, angle: Floats) -> Floats:
@@ -356,7 +363,12 @@ def _fixed_poles(magnet: Magnet, faces: RadialForce) -> Energy:
         beyond = magnet_energy(magnet, x * further, y * further, angle, nodes=nodes)
         return np.asarray(here - (beyond - here) / step * (nearest - r))
 
-    return energy
+    end = faces.cutoff
+    far = fit_multipoles(
+        lambda *at: magnet_energy(magnet, *at, nodes=4), max(magnet[:3]),
+        max(POLICY.taper * end, faces.contact), end,
+    )  # fmt: skip
+    return lambda x, y, a: energy(x, y, a) * far.fade(x, y) - far.energy(x, y, a), far
 
 
 def _oriented(energy: Energy, contact: float, end: float, *, of_magnets: bool) -> dict[str, Any]:

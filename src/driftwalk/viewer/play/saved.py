@@ -170,7 +170,7 @@ def _pull(study: Study | None) -> dict[str, Any] | None:
     pull = None if study is None else block_pull(study)
     if pull is None:
         return None
-    tables, oriented = pull.tables, pull.tables.oriented
+    tables, oriented, far = pull.tables, pull.tables.oriented, pull.tables.multipoles
     return {
         "reach": tables.reach,
         "lever": tables.lever,
@@ -185,6 +185,9 @@ def _pull(study: Study | None) -> dict[str, Any] | None:
             "coefficient": _doubles(oriented["coefficient"]),
             "angles": oriented["coefficient"].shape[1],
         },
+        "multipoles": None
+        if far is None
+        else {**far._asdict(), "coefficient": list(far.coefficient)},
     }
 
 
