@@ -76,26 +76,24 @@ def test_each_flow_is_stretched_to_a_larger_tank(switched: tuple[xr.Dataset, Pat
     assert any("stretched to 0.6 m" in text for text in warnings)
 
 
+@pytest.mark.parametrize("changes", [False, True])
 def test_a_given_flow_takes_the_place_of_all(
-    switched: tuple[xr.Dataset, Path], tmp_path: Path
+    changes: bool, switched: tuple[xr.Dataset, Path], tmp_path: Path
 ) -> None:
     """One that changes in time is refused; a steady one is taken with σ_F of the first flow."""
     fit, path = switched
-    steady = fitted_flow(fit, interval=1)
-    moving = build_flow_field(
-        steady["x"],
-        steady["y"],
-        time=[0.0, 1.0],
-        **{name: np.stack(2 * [steady[name].values]) for name in ("u", "v", "flag")},
-        attrs={"arena": steady.attrs["arena"]},
-    )
-    for name, flow in (("steady", steady), ("moving", moving)):
-        dw.save_flow(flow, tmp_path / f"{name}.nc")
-        source, modes, warnings = settings(path, tmp_path / f"{name}.nc")
-        assert len(modes) == 1
-        assert modes[0].study.forces.force_std_N == FORCES_N[0]
-        np.testing.assert_array_equal(modes[0].flow["u"], flow["u"])
-        assert source.first_force in warnings
-        assert "that of flow low is taken for all" in str(source.first_force)
-    with pytest.raises(InputError, match="changes in time"):
-        make_modes(modes, flow_scales=[0.0, 1.0])
+    flow = fitted_flow(fit, interval=1)
+    if changes:
+        frames = {name: np.stack(2 * [flow[name].values]) for name in ("u", "v", "flag")}
+        attrs = {"arena": flow.attrs["arena"]}
+        flow = build_flow_field(flow["x"], flow["y"], time=[0.0, 1.0], **frames, attrs=attrs)
+    dw.save_flow(flow, tmp_path / "flow.nc")
+    source, modes, warnings = settings(path, tmp_path / "flow.nc")
+    assert len(modes) == 1
+    assert modes[0].study.forces.force_std_N == FORCES_N[0]
+    np.testing.assert_array_equal(modes[0].flow["u"], flow["u"])
+    assert source.first_force in warnings
+    assert "that of flow low is taken for all" in str(source.first_force)
+    if changes:
+        with pytest.raises(InputError, match="changes in time"):
+            make_modes(modes, flow_scales=[0.0, 1.0])
