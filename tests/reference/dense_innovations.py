@@ -173,11 +173,14 @@ def dense_filter(
     rows |= {"whitened": [], "jacobian": []}
     s = P = M = None
     last, outliers = -np.inf, 0
+    # After a gap, and no sample has given a velocity since: nothing drags, and no error counts.
+    restarted = False
     for k in range(time.size):
         e, S, used = np.full(d, np.nan), np.full((d, d), np.nan), False
         whitened, jacobian = np.zeros(d), np.zeros((d, width))
         interval = time[k] - time[k - 1]
         if time[k] - last > 1.0:
+            restarted = restarted or s is not None
             s = None
         if s is not None:
             steps = max(1, int(np.ceil(interval / largest - 1e-9)))
@@ -195,8 +198,11 @@ def dense_filter(
                         name: np.interp(share, [0, 1], track[name][k - 1 : k + 1])
                         for name in ("theta", "omega")
                     }
+                acts = float(not restarted)
                 found = mean_drag(coefficients, s, middle, **options)
-                spread = intensity + interval * bend_covariance(coefficients, s, middle, **options)
+                found = {name: acts * one for name, one in found.items()}
+                bent = bend_covariance(coefficients, s, middle, **options)
+                spread = intensity + acts * interval * bent
                 W = np.linalg.inv(eye - h / 2 * found["by_velocity"])
                 kick = np.eye(2 * d)
                 kick[d:] += h * W @ np.hstack([found["by_position"], found["by_velocity"]])
@@ -219,7 +225,7 @@ def dense_filter(
         if s is not None and there:
             e, S = value - observe @ s, observe @ P @ observe.T + R
             outlier = e @ np.linalg.solve(S, e) >= 40
-            used = not outlier and not track["excluded"][k]
+            used = not outlier and not track["excluded"][k] and not restarted
             if used:
                 L = np.linalg.cholesky(S)
                 whitened = np.linalg.solve(L, e)
@@ -233,6 +239,7 @@ def dense_filter(
                 K = np.linalg.solve(S, observe @ P).T
                 keep = np.eye(2 * d) - K @ observe
                 s, P, M = s + K @ e, keep @ P @ keep.T + K @ R @ K.T, keep @ M
+                restarted = restarted and bool(track["excluded"][k])
         elif s is None and not np.isnan(value).any():
             s, P, outliers = (
                 np.concatenate([value, still]),
