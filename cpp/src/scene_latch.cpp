@@ -166,8 +166,8 @@ bool is_clear_of_others(const AssemblyRules& rules, const Scene& scene, int asse
     if (others.blocks == 0 || other == assembly) {
       continue;
     }
-    // The square of a member's distance times a block's mass is a part of the moment of inertia, and
-    // so no more than it; the factor is for rounding.
+    // The square of a member's distance times a block's mass is a part of the moment of inertia,
+    // and so no more than it; the factor is for rounding.
     const double within = reach + std::sqrt(1.001 * others.inertia / rules.mass);
     if (square_from_middle({others.x, others.y}) > within * within &&
         square_from_middle({others.before.x, others.before.y}) > within * within) {

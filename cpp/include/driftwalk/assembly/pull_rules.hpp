@@ -5,8 +5,8 @@ namespace driftwalk {
 
 // A function of the squared distance, linear within cells of 1/64 of an octave: its value at the
 // lower end of a cell and its slope, one pair after the other. Below the first cell it is constant;
-// the last pair holds for all that lies beyond, and is (0, 0) for faces. Look-ups in single precision
-// read two numbers more than there are, and use none of the two.
+// the last pair holds for all that lies beyond, and is (0, 0) for faces. Look-ups in single
+// precision read two numbers more than there are, and use none of the two.
 struct RadialTable {
   const float* single = nullptr;
   const double* twice = nullptr; // the same numbers
