@@ -11,17 +11,7 @@
 namespace driftwalk {
 
 AssemblyKernel chosen_assembly_kernel() {
-#if defined(DRIFTWALK_X86_LANES)
-  switch (chosen_instruction_set()) {
-  case InstructionSet::avx512:
-    return assembly_kernel_avx512();
-  case InstructionSet::avx2:
-    return assembly_kernel_avx2();
-  case InstructionSet::baseline:
-    break;
-  }
-#endif
-  return assembly_kernel_baseline();
+  return DRIFTWALK_CHOSEN(assembly_kernel_);
 }
 
 namespace {

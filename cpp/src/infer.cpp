@@ -53,17 +53,7 @@ void check(const Track& track, Angle angle, int layers) {
 } // namespace
 
 InferKernel chosen_infer_kernel() {
-#if defined(DRIFTWALK_X86_LANES)
-  switch (chosen_instruction_set()) {
-  case InstructionSet::avx512:
-    return infer_kernel_avx512();
-  case InstructionSet::avx2:
-    return infer_kernel_avx2();
-  case InstructionSet::baseline:
-    break;
-  }
-#endif
-  return infer_kernel_baseline();
+  return DRIFTWALK_CHOSEN(infer_kernel_);
 }
 
 DragModel::DragModel(const FloatingBlock& block, const SplineView& flow, const double* coefficients,

@@ -7,17 +7,7 @@
 namespace driftwalk {
 
 SimulateKernel chosen_kernel() {
-#if defined(DRIFTWALK_X86_LANES)
-  switch (chosen_instruction_set()) {
-  case InstructionSet::avx512:
-    return simulate_kernel_avx512();
-  case InstructionSet::avx2:
-    return simulate_kernel_avx2();
-  case InstructionSet::baseline:
-    break;
-  }
-#endif
-  return simulate_kernel_baseline();
+  return DRIFTWALK_CHOSEN(simulate_kernel_);
 }
 
 void simulate_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, int threads,

@@ -12,20 +12,6 @@
 namespace driftwalk {
 
 namespace {
-TankKernels chosen_kernels() {
-#if defined(DRIFTWALK_X86_LANES)
-  switch (chosen_instruction_set()) {
-  case InstructionSet::avx512:
-    return tank_kernels_avx512();
-  case InstructionSet::avx2:
-    return tank_kernels_avx2();
-  case InstructionSet::baseline:
-    break;
-  }
-#endif
-  return tank_kernels_baseline();
-}
-
 // Room for the events of one step of a pack. A block has four bonds.
 class EventRoom {
 public:
@@ -90,7 +76,7 @@ std::vector<T> rows_of(const std::vector<T>& from, const std::vector<std::int64_
 
 TankBatch::TankBatch(std::vector<TankFlow> flows, std::vector<std::uint64_t> key,
                      const double* start, const LiveBlocks* joined, int threads)
-    : flows_(std::move(flows)), kernels_(chosen_kernels()), key_(std::move(key)) {
+    : flows_(std::move(flows)), kernels_(DRIFTWALK_CHOSEN(tank_kernels_)), key_(std::move(key)) {
   const std::size_t worlds = key_.size(), rows = worlds * static_cast<std::size_t>(blocks());
   const bool twice = flows_.front().twice != nullptr;
   const auto kept_bytes = twice ? kernels_.twice.kept_bytes : kernels_.single.kept_bytes;

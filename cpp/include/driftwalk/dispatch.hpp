@@ -15,4 +15,24 @@ bool is_available(InstructionSet set);
 // unknown or not available here.
 InstructionSet chosen_instruction_set();
 
+// DRIFTWALK_CHOSEN(simulate_kernel_) calls that of simulate_kernel_baseline, simulate_kernel_avx2
+// and simulate_kernel_avx512 whose set is chosen.
+#if defined(DRIFTWALK_X86_LANES)
+template <class Function>
+auto call_chosen(Function baseline, Function avx2, Function avx512) {
+  switch (chosen_instruction_set()) {
+  case InstructionSet::avx512:
+    return avx512();
+  case InstructionSet::avx2:
+    return avx2();
+  case InstructionSet::baseline:
+    break;
+  }
+  return baseline();
+}
+#define DRIFTWALK_CHOSEN(name) ::driftwalk::call_chosen(name##baseline, name##avx2, name##avx512)
+#else
+#define DRIFTWALK_CHOSEN(name) name##baseline()
+#endif
+
 } // namespace driftwalk

@@ -16,5 +16,5 @@ constexpr auto kernel_of() {
 DRIFTWALK_LANES_END
 
 driftwalk::TankKernels driftwalk::DRIFTWALK_PER_ISA(tank_kernels_)() {
-  return {kernel_of<FloatPack<assembly_lanes>>(), kernel_of<DoublePack<double_lanes>>()};
+  return {kernel_of<FloatPack<assembly_lanes>>(), kernel_of<DoublePack<native_doubles>>()};
 }

@@ -1,6 +1,5 @@
-// Packs of doubles with the bits of single doubles: every operation is one
-// that IEEE 754 defines, in the same order, and what a single number leaves to the system, a lane
-// does too.
+// Packs of doubles with the bits of single doubles: every operation is one that IEEE 754 defines,
+// in the same order, and what a single number leaves to the system, a lane does too.
 #pragma once
 
 #include "driftwalk/math/elementary_double.hpp"
@@ -10,14 +9,6 @@ DRIFTWALK_LANES_BEGIN
 
 template <int N>
 using DoublePack = Pack<double, N>;
-
-#if defined(__AVX512F__)
-inline constexpr int double_lanes = 8;
-#elif defined(__AVX2__)
-inline constexpr int double_lanes = 4;
-#else
-inline constexpr int double_lanes = 2;
-#endif
 
 template <int N>
 inline bool any(Mask<N, std::int64_t> mask) {

@@ -8,14 +8,6 @@
 
 DRIFTWALK_LANES_BEGIN
 
-#if defined(DRIFTWALK_USE_X86) && defined(__AVX512F__)
-inline constexpr int native_doubles = 8;
-#elif defined(__AVX2__)
-inline constexpr int native_doubles = 4;
-#else
-inline constexpr int native_doubles = 2;
-#endif
-
 template <int N>
 struct Doubles {
   static constexpr int width = N < native_doubles ? N : native_doubles;

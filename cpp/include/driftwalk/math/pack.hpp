@@ -51,6 +51,15 @@ using IntPack = Pack<Int32, N>;
 template <int N>
 using UIntPack = Pack<UInt32, N>;
 
+// Doubles of one of the processor's vectors.
+#if defined(DRIFTWALK_USE_X86) && defined(__AVX512F__)
+inline constexpr int native_doubles = 8;
+#elif defined(__AVX2__)
+inline constexpr int native_doubles = 4;
+#else
+inline constexpr int native_doubles = 2;
+#endif
+
 // Integers as wide as a number.
 template <class T>
 using SignedAs = std::conditional_t<sizeof(T) == 8, std::int64_t, Int32>;
