@@ -74,6 +74,11 @@ class Series:
     """Time of the recording's first sample [s]."""
 
     @property
+    def gaps(self) -> Bools:
+        """Which intervals are gaps, over which nothing is predicted, shape (n - 1,)."""
+        return np.diff(self.time) > FILTER.longest_gap_s
+
+    @property
     def settled(self) -> Bools:
         """Which samples are not the first ones of a stretch, shape (n,).
 
@@ -81,7 +86,7 @@ class Series:
         its next errors are far smaller than it expects, and places where it often begins, which are
         those at the wall, would seem to have less noise.
         """
-        begins = np.concatenate([[True], np.diff(self.time) > FILTER.longest_gap_s])
+        begins = np.concatenate([[True], self.gaps])
         begins |= self.excluded != 0
         settled = ~begins
         for later in range(1, FILTER.settling_samples + 1):
@@ -444,19 +449,17 @@ def usable_intervals(series: Sequence[Series]) -> int:
     """Return the number of intervals that are not left out, no gaps, and not next after one."""
     count = 0
     for one in series:
-        gaps = np.diff(one.time) > FILTER.longest_gap_s
-        left_out = gaps | (one.excluded[1:] != 0)
-        left_out[1:] |= gaps[:-1]
+        left_out = one.gaps | (one.excluded[1:] != 0)
+        left_out[1:] |= one.gaps[:-1]
         count += int(np.count_nonzero(~left_out))
     return count
 
 
 def gaps_unsettled(series: Sequence[Series]) -> str:
     """Return why gaps leave C_d unsettled; nothing where the stretches between them are long."""
-    steps = [np.diff(one.time) for one in series]
-    gaps = sum(int(np.count_nonzero(one > FILTER.longest_gap_s)) for one in steps)
-    seen = sum(float(one[one <= FILTER.longest_gap_s].sum()) for one in steps)
-    mean = seen / (gaps + len(steps))
+    gaps = sum(int(np.count_nonzero(one.gaps)) for one in series)
+    seen = sum(float(np.diff(one.time)[~one.gaps].sum()) for one in series)
+    mean = seen / (gaps + len(series))
     if not gaps or mean >= FILTER.least_stretch_s:
         return ""
     return (
