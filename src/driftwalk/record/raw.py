@@ -182,6 +182,8 @@ class ReadOptions:
     columns: dict[str, str] = field(default_factory=dict)
     """Name or number (from 1) of the column of each quantity, such as t, frame, x, y, theta, body;
     ``":unit"`` may follow. Columns of ``"skip"``, with plus signs between, are not read."""
+    columns_stated_by: str = "you named it"
+    """Why `columns` are what they are, in the words of a reading."""
     delimiter: str | None = None
     """Character between fields; None: recognised."""
     frame_rate_hz: float | None = None

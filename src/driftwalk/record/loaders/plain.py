@@ -96,14 +96,12 @@ def described(
     **facts
         What the `RawRecording` says besides.
     """
-    stated = replace(options, columns=dict(columns), box="none")
+    stated = replace(
+        options, columns=dict(columns), columns_stated_by="a column of this format", box="none"
+    )
     raw = recording_of(TextSource(path, stated, layout), stated)
     known = {"bare_length_is_si": False, "bare_angle": False, "body_columns": None}
-    columns_read = [
-        one | {"why": one["why"].replace("you named it", "a column of this format")}
-        for one in raw.columns
-    ]
-    return replace(raw, **(known | {"columns": columns_read} | facts))
+    return replace(raw, **(known | facts))
 
 
 def side_by_side(

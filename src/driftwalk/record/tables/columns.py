@@ -329,7 +329,7 @@ class _Reader(NamedColumns):
             column.role = sides.get(at, meaning.quantity if meaning else "")
             column.body = used.get(at, "")
             column.unit = meaning.unit if meaning else ""
-            if column.why != "you named it":
+            if column.why != self.options.columns_stated_by:
                 column.why = "by its name"
                 if at in sides and result.box is not None:
                     column.why = f"by its name: a side of a box ({result.box.form})"

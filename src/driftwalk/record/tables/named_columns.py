@@ -134,7 +134,7 @@ class NamedColumns:
                     part, unit or inferred, "", bool(known and known.bare), unknown, rank=-1
                 )
                 self.meanings = kept
-                self.result.columns[index].why = "you named it"
+                self.result.columns[index].why = self.options.columns_stated_by
 
     def unit_of(self, at: int) -> str:
         """Return the unit of any column, as its name or the row below states it."""
