@@ -60,13 +60,15 @@ def test_equal_rates_are_refused_in_five_percent_at_most(memory: float) -> None:
     assert refused <= binom.ppf(0.999, sets, 0.05), refused
 
 
-@pytest.mark.study
-@pytest.mark.parametrize(("form", "memory"), [(FORMS[0], 1.0), (FORMS[2], 0.2)])
+@pytest.mark.parametrize(
+    ("form", "memory"),
+    [
+        pytest.param(FORMS[0], 1.0, marks=pytest.mark.slow),
+        pytest.param(FORMS[2], 0.2, marks=pytest.mark.study),
+    ],
+)
 def test_bands_hold_the_truth_as_often_as_they_say(form: Form, memory: float) -> None:
-    """Shares after 60 and 150 s and the committor, of 200 runs; 90 % within binomial chance.
-
-    In every run: the bands of a command (tests/integration/test_kinetics_command.py).
-    """
+    """Shares after 60 and 150 s and the committor, of 200 runs; 90 % within binomial chance."""
     truth = histories([chain_runs(30_000, 9, memory=memory)], classes=CLASSES)
     times, sets, at = np.array([60.0, 150.0]), 30, CLASSES.index("1+1+1+1")
     chosen = [CLASSES.index("T"), CLASSES.index("2+1+1")]
