@@ -6,7 +6,6 @@ import pytest
 from thresholds_page import PAGE, Policy, policies, thresholds_page
 
 
-@pytest.mark.slow
 def test_the_page_is_made_from_the_policies() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert thresholds_page(page) == page, "run: python tests/architecture/thresholds_page.py"
