@@ -169,9 +169,12 @@ def test_a_unit_that_kills_every_worker_is_named_and_the_rest_kept(tmp_path: Pat
     said = sweep("fatal", tmp_path / "fatal", environment=environment)
     assert said.startswith("ERROR unit 00000003-00000004")
     assert "ended all 2 workers" in said
-    # Others that these workers held are suspects too, and were still to be tried alone.
+    # Suspects too are all others that these workers held, on a loaded machine one of them alone.
+    # They were still to be tried alone.
     held = 2 * HANDOUT.for_each_worker
-    assert 16 - held <= len(shards_of(tmp_path / "fatal")) < 16
+    kept = shards_of(tmp_path / "fatal")
+    assert 16 - held <= len(kept) < 16
+    assert "00000003-00000004.npz" not in kept
     # At home, where nothing kills it, the sweep goes on from there.
     assert sum_at_home(tmp_path / "fatal") == 1240.0
 
