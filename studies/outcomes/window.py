@@ -1,6 +1,6 @@
 """Coverage of a fit to the part of a track that is seen in a quarter of the tank.
 
-    python studies/outcomes/window.py [RECORDINGS]        (some four seconds of processor time each)
+    python studies/outcomes/window.py [RECORDINGS]        (some nine seconds of processor time each)
 
 One block for 20 minutes in the bundled flow, C_d 0.45 and sigma_F 0.55 mN, 0.3 mm and 0.5 degrees
 of noise in the study of the fit. Prints which 90 % intervals of C_d and sigma_F hold.
@@ -32,8 +32,13 @@ def main(recordings: int) -> None:
         whole = build_trajectory(clock, **pose)
         seen = (whole["x"] > 0) & (whole["y"] > 0)
         window = whole.assign({name: whole[name].where(seen) for name in pose})
-        for words, track in (("window", window), ("whole", whole)):
-            ends = dw.fit_motion(track, STUDY)["interval"].sel(parameter=list(TRUTH)).values
+        for words, track, flow in (
+            ("window", window, None),
+            ("window, flow known", window, dw.tank30_flow()),
+            ("whole", whole, None),
+        ):
+            fit = dw.fit_motion(track, STUDY, flow=flow)
+            ends = fit["interval"].sel(parameter=list(TRUTH)).values
             held = [low <= at <= high for at, (low, high) in zip(TRUTH.values(), ends, strict=True)]
             print(number, words, dict(zip(TRUTH, held, strict=True)), ends.tolist(), flush=True)
 
