@@ -41,9 +41,13 @@ public:
     for (int lane = 0; lane < lanes; ++lane) {
       if (lane < worlds) {
         load_lane<Real, T>(rules_, start, memory_, lane);
-        // One assembly until its world begins: blocks of a lane without a world pull at nothing.
+        // One assembly until its world begins: blocks of a lane without a world pull at nothing,
+        // and no water reaches them.
         for (int b = 0; b < blocks_ && !Crowded; ++b) {
           put(memory_.members[b].root, lane, 0);
+          for (auto& face : memory_.members[b].covered) {
+            put(face, lane, true);
+          }
         }
         const int bonds = bond_room(capacity);
         books_[lane].bonds = {memory_.bonds + bonds * lane, 0, bonds};
