@@ -12,7 +12,8 @@
 
 class Pull {
 public:
-  Pull(double reach, double lever, In<double, 1> pole, bool like_poles_repel) {
+  Pull(double reach, double lever, In<double, 1> pole, bool like_poles_repel, int every,
+       double near_fading, double near_end, double near_reach) {
     if (pole.size() != 4) {
       throw std::invalid_argument("a block has four poles");
     }
@@ -20,6 +21,10 @@ public:
     rules_.reach = reach;
     rules_.lever = lever;
     rules_.like_poles_repel = like_poles_repel;
+    rules_.every = every;
+    rules_.near_fading = near_fading;
+    rules_.near_end = near_end;
+    rules_.near_reach = near_reach;
     for (std::size_t face = 0; face < 4; ++face) {
       rules_.pole[face] = pole.data()[face];
     }
@@ -81,8 +86,9 @@ private:
 inline void register_pull(nb::module_& module) {
   using namespace nb::literals;
   nb::class_<Pull>(module, "Pull")
-      .def(nb::init<double, double, In<double, 1>, bool>(), nb::kw_only(), "reach"_a, "lever"_a,
-           "pole"_a, "like_poles_repel"_a)
+      .def(nb::init<double, double, In<double, 1>, bool, int, double, double, double>(),
+           nb::kw_only(), "reach"_a, "lever"_a, "pole"_a, "like_poles_repel"_a, "every"_a,
+           "near_fading"_a, "near_end"_a, "near_reach"_a)
       .def("set_radial", &Pull::set_radial, "what"_a, "cells"_a, "first"_a)
       .def("set_oriented", &Pull::set_oriented, "coefficient"_a, nb::kw_only(), "first"_a,
            "per_step"_a, "low"_a, "high"_a)

@@ -241,12 +241,18 @@ FaceRules* make_faces(int kinds, int types, const std::int32_t* count, const std
   return rules;
 }
 
-EXPORT(make_pull) Pull* make_pull(double reach, double lever, int like_poles_repel) {
+EXPORT(make_pull)
+Pull* make_pull(double reach, double lever, int like_poles_repel, int every, double near_fading,
+                double near_end, double near_reach) {
   Pull* const pull = new Pull;
   pull->rules.on = true;
   pull->rules.reach = reach;
   pull->rules.lever = lever;
   pull->rules.like_poles_repel = like_poles_repel != 0;
+  pull->rules.every = every;
+  pull->rules.near_fading = near_fading;
+  pull->rules.near_end = near_end;
+  pull->rules.near_reach = near_reach;
   return pull;
 }
 // `what` is 0 for centres, 1 for resistance, 2 for faces.

@@ -142,7 +142,16 @@ def available_instruction_sets() -> list[str]: ...
 # Tables of the forces between blocks, see `driftwalk.assembly.pull.tables`.
 class Pull:
     def __init__(
-        self, *, reach: float, lever: float, pole: _Floats, like_poles_repel: bool
+        self,
+        *,
+        reach: float,
+        lever: float,
+        pole: _Floats,
+        like_poles_repel: bool,
+        every: int,
+        near_fading: float,
+        near_end: float,
+        near_reach: float,
     ) -> None: ...
     def set_radial(self, what: str, cells: _Floats, first: int) -> None: ...
     def set_oriented(

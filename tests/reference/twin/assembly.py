@@ -382,8 +382,9 @@ def drag_sums(
         typed = rules.latch.faces
         pole = None if typed is None else np.concatenate([typed.poles(b) for b in world.assemblies])
         force_x, force_y, torque = np.stack([force_x, force_y, torque]) + pull_of_blocks(
-            rules.pull, *_drifted(world), hidden, owner, None if pole is None else pole.T
-        )
+            rules.pull, *_drifted(world), hidden, owner, world.step - 1,
+            None if pole is None else pole.T,
+        )  # fmt: skip
     sums, first = [], 0
     for body, arm in zip(world.assemblies, arms, strict=True):
         own = slice(first, first + body.size)

@@ -26,12 +26,21 @@ def strength(force: RadialForce, squared: npt.ArrayLike) -> Floats:
     return np.interp(squared, *nodes(force))
 
 
+def share_in_step(pull: BlockPull, squared: float, step: int) -> float:
+    """Return the share of a force of faces that acts in a step: of its near and distant parts."""
+    every, start, end = pull.tables.stepping
+    part = np.clip((squared - start) / (end - start), 0.0, 1.0)
+    near = 1.0 - 3.0 * part**2 + 2.0 * part**3
+    return float(near + (every * (1.0 - near) if step % every == every // 2 else 0.0))
+
+
 def pull_of_blocks(
     pull: BlockPull,
     members: Floats,
     motions: Floats,
     hidden: npt.NDArray[np.bool_],
     body: Floats,
+    step: int,
     pole: npt.NDArray[np.int_] | None = None,
 ) -> Floats:
     """Return force x, y [N] and torque [N m] on each block, about its centre, shape (3, n).
@@ -46,6 +55,8 @@ def pull_of_blocks(
         Joined faces, in the assembly's frame.
     body : ndarray, shape (n,)
         The assembly of each block.
+    step : int
+        Number of the time step.
     pole : ndarray of int, shape (4, n), optional
         Poles of the faces, in the assembly's frame: like ones repel; default: all attract.
     """
@@ -65,6 +76,7 @@ def pull_of_blocks(
             for j in np.flatnonzero(~hidden[:, b]):
                 apart = way + levers[j, b] - levers[i, a]
                 one = strength(pull.faces, apart @ apart) * apart
+                one *= share_in_step(pull, apart @ apart, step)
                 if pole is not None:
                     one = -pole[i, a] * pole[j, b] * one
                 force += one

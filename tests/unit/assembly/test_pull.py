@@ -70,12 +70,13 @@ def test_force_and_torque_are_the_slopes_of_the_energy(place: tuple[float, float
 
 @pytest.mark.parametrize("poles", ["turning", pytest.param("fixed", marks=pytest.mark.slow)])
 def test_the_kernel_accelerates_two_blocks_by_these_forces(poles: str) -> None:
-    # One step from rest; of fixed poles the energy of all 16 pairs of faces, by differences.
+    # One cycle of steps from rest; of fixed poles the energy of all 16 pairs of faces, by
+    # differences.
     text, magnet = "5x5x2mm,1.3T", MAGNETS["5x5x2mm,1.3T"]
     pair = still_pair(
         [[0.0, 0.0, 0.2], [0.044, 0.008, -0.3]],
         interaction={"magnets": text, "poles": poles, "cutoff_m": 0.3},
-        simulation={"time_step_s": 1e-3},
+        simulation={"time_step_s": 2e-4},
     )
     tank = dw.LiveTank(**pair)
     tank.advance(1e-3)
@@ -222,6 +223,60 @@ def test_fixed_poles_keep_energy_through_their_table_and_beyond() -> None:
         tank.advance(0.1 if len(totals) > 50 else 0.01)
     assert max(kinetics) > 1e-5
     assert np.ptp(totals) < 1e-3 * max(kinetics)
+
+
+@pytest.mark.slow
+def test_distant_magnets_that_wait_keep_energy_and_momentum() -> None:
+    # Three blocks of like poles fly apart: from near each other, where all acts in each step, to
+    # beyond the cut-off.
+    places = [[0.0, 0.0, 0.1], [0.046, 0.012, 0.4], [0.01, -0.05, -0.3]]
+    pair = still_pair(
+        places, interaction={"magnets": "5x5x2mm,1.3T"}, assembly={"faces": "N,N,N,N"},
+        simulation={"time_step_s": 1e-3},
+    )  # fmt: skip
+    tank, pull = dw.LiveTank(**pair), block_pull(pair["study"])
+    assert pull is not None
+    assert pull.faces is not None
+    assert pull.tables.stepping.every > 1
+    r = np.linspace(1e-3, 0.3, 60_001)
+    force = pull.faces(r)
+    work = np.append(np.cumsum(((force[1:] + force[:-1]) / 2 * np.diff(r))[::-1])[::-1], 0.0)
+
+    def potential() -> float:
+        turn = tank.theta[:, None] + np.arange(4) * np.pi / 2
+        x, y = (
+            tank.x[:, None] + pull.lever * np.cos(turn),
+            tank.y[:, None] + pull.lever * np.sin(turn),
+        )
+        pairs = [(0, 1), (0, 2), (1, 2)]
+        return sum(
+            float(np.interp(np.hypot(x[b] - x[a][:, None], y[b] - y[a][:, None]), r, work).sum())
+            for a, b in pairs
+        )
+
+    totals, kinetics = [], []
+    for _ in range(120):
+        kinetic = MASS / 2 * (tank.vx**2 + tank.vy**2) + MASS * SIDE**2 / 12 * tank.omega**2
+        kinetics.append(float(kinetic.sum()))
+        totals.append(kinetics[-1] + potential())
+        momentum = MASS * np.array([tank.vx.sum(), tank.vy.sum()])
+        spin = (tank.x * tank.vy - tank.y * tank.vx + SIDE**2 / 6 * tank.omega).sum() * MASS
+        np.testing.assert_allclose([*momentum, spin], 0.0, atol=1e-13)
+        tank.advance(0.005 if len(totals) < 100 else 0.1)
+    assert max(kinetics) > 1e-4
+    assert np.ptp(totals) < 1e-3 * max(kinetics)
+
+
+def test_a_cycle_of_distant_magnets_goes_on_after_a_pause() -> None:
+    pair = still_pair(
+        [[0.0, 0.0, 0.2], [0.07, 0.01, -0.3]], interaction={"magnets": "5x5x2mm,1.3T"}
+    )
+    paused, whole = dw.LiveTank(**pair), dw.LiveTank(**pair)
+    for steps in (1, 3, 7):
+        paused.advance(0.01 * steps)
+    whole.advance(0.11)
+    for name in ("x", "y", "theta", "vx"):
+        np.testing.assert_array_equal(getattr(paused, name), getattr(whole, name))
 
 
 def test_menisci_attract_by_the_closed_form() -> None:

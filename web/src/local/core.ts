@@ -41,7 +41,15 @@ interface Exports {
     latches: Address,
     becomes: Address,
   ): Address;
-  make_pull(reach: number, lever: number, likePolesRepel: number): Address;
+  make_pull(
+    reach: number,
+    lever: number,
+    likePolesRepel: number,
+    every: number,
+    nearFading: number,
+    nearEnd: number,
+    nearReach: number,
+  ): Address;
   set_radial(pull: Address, what: number, cells: Address, count: number, first: number): void;
   set_oriented(
     pull: Address,

@@ -47,6 +47,10 @@ const faceTable = object({
 const pullTables = object({
   reach: number,
   lever: number,
+  every: number,
+  near_fading: number,
+  near_end: number,
+  near_reach: number,
   radial: list(object({ what: text, cells: text, first: number })),
   oriented: nullable(
     object({
@@ -140,7 +144,8 @@ function makeFaces(core: Core, content: unknown): Address {
 
 async function makePull(core: Core, content: unknown): Promise<Address> {
   const tables = pullTables(content, "magnets");
-  const pull = core.call.make_pull(tables.reach, tables.lever, 0);
+  const { reach, lever, every, near_fading, near_end, near_reach } = tables;
+  const pull = core.call.make_pull(reach, lever, 0, every, near_fading, near_end, near_reach);
   for (const { what, cells, first } of tables.radial) {
     const values = await doubles(cells);
     core.with([values], (at) =>

@@ -5,6 +5,7 @@
 
 #include "driftwalk/assembly/member.hpp"
 #include "driftwalk/physics/drag.hpp"
+#include "driftwalk/physics/open_faces.hpp"
 #include "driftwalk/physics/panels.hpp"
 #include "driftwalk/physics/physics.hpp"
 #include "driftwalk/physics/water.hpp"
@@ -115,25 +116,88 @@ inline DragSums<Real> drag_of_member(const Physics<Real, T, Law>& physics, Real 
   return drag;
 }
 
-// Drag of a block half a step ahead, about its assembly's centre of mass.
+// A block half a step ahead.
+template <class Real>
+struct AheadMember {
+  Real x, y;
+  Axes<Real> axes;
+  Arm<Real> arm;
+  Motion<Real> own;
+};
+
 template <class Real, class T, class Law>
-inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>& m, Sums<Real>& sums) {
+inline AheadMember<Real> ahead_of(const Physics<Real, T, Law>& physics, Member<Real>& m) {
   const Ahead<Real> ahead = look_ahead(physics.step, m, m.noise);
   m.ahead = ahead.motion;
   const Axes<Real> axes = axes_at(ahead.pose.theta);
   const Real arm_x = m.offset_x * axes.cosine - m.offset_y * axes.sine;
   const Real arm_y = m.offset_x * axes.sine + m.offset_y * axes.cosine;
-  const Motion<Real> own{m.ahead.vx - m.ahead.omega * arm_y, m.ahead.vy + m.ahead.omega * arm_x,
-                         m.ahead.omega};
-  const DragSums<Real> drag =
-      drag_of_member(physics, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes, own, m);
+  return {ahead.pose.x + arm_x,
+          ahead.pose.y + arm_y,
+          axes,
+          {arm_x, arm_y},
+          {m.ahead.vx - m.ahead.omega * arm_y, m.ahead.vy + m.ahead.omega * arm_x, m.ahead.omega}};
+}
+
+// Its drag, about its own centre, about its assembly's centre of mass.
+template <class Real, class T, class Law>
+inline void add_drag(const Physics<Real, T, Law>& physics, const AheadMember<Real>& ahead,
+                     const DragSums<Real>& drag, Sums<Real>& sums) {
+  const Arm<Real>& arm = ahead.arm;
   sums.part[0] = drag.force_x;
   sums.part[1] = drag.force_y;
-  sums.part[2] = drag.torque + (arm_x * drag.force_y - arm_y * drag.force_x);
+  sums.part[2] = drag.torque + (arm.x * drag.force_y - arm.y * drag.force_x);
   sums.part[3] = drag.conductance;
-  sums.part[4] = drag.conductance * (arm_x * arm_x + arm_y * arm_y);
+  sums.part[4] = drag.conductance * (arm.x * arm.x + arm.y * arm.y);
   if (physics.water.count > 0) {
-    add_water(physics, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes, {arm_x, arm_y}, sums);
+    add_water(physics, ahead.x, ahead.y, ahead.axes, arm, sums);
+  }
+}
+
+// Whether the faces that the water reaches are to be taken side by side: of a pack whose law and
+// flow are the same in each lane, where some are covered.
+template <class Real, class T, class Law>
+inline bool has_faces_to_skip(const Physics<Real, T, Law>& physics, const Member<Real>* members,
+                              int rows) {
+  if (!std::is_empty_v<Law> || physics.flow.lanes != nullptr || physics.shape.panel_count > 0 ||
+      physics.hidden_share > T(0)) {
+    return false;
+  }
+  auto covered = members[0].covered[0];
+  for (int row = 0; row < rows; ++row) {
+    for (const auto& face : members[row].covered) {
+      covered = covered | face;
+    }
+  }
+  return any(covered);
+}
+
+template <class Real, class T, class Law>
+inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>* members, Sums<Real>* sums,
+                      int rows) {
+  if constexpr (Numbers<Real>::lanes > 1) {
+    if (has_faces_to_skip(physics, members, rows)) {
+      AheadMember<Real> ahead[most_open_blocks];
+      OpenFaces<Real> faces;
+      for (int row = 0; row < rows; ++row) {
+        ahead[row] = ahead_of(physics, members[row]);
+        faces.add(physics.block, physics.flow, ahead[row].x, ahead[row].y, ahead[row].axes,
+                  ahead[row].own, members[row].covered);
+      }
+      faces.sum(physics.law, physics.block, physics.flow);
+      for (int row = 0; row < rows; ++row) {
+        const DragSums<Real> drag =
+            faces.take(physics.block, physics.flow.unit, ahead[row].axes, ahead[row].own);
+        add_drag(physics, ahead[row], drag, sums[row]);
+      }
+      return;
+    }
+  }
+  for (int row = 0; row < rows; ++row) {
+    const AheadMember<Real> ahead = ahead_of(physics, members[row]);
+    add_drag(physics, ahead,
+             drag_of_member(physics, ahead.x, ahead.y, ahead.axes, ahead.own, members[row]),
+             sums[row]);
   }
 }
 
@@ -174,8 +238,10 @@ template <class Real, class T, class Law, class Sum, class Pull>
 inline void advance(const Physics<Real, T, Law>& physics, int half, Member<Real>* members,
                     Sums<Real>* sums, int rows, const Sum& sum, const Pull& pull) {
   sum_noise(physics, half, members, sums, rows, sum);
-  for (int row = 0; row < rows; ++row) {
-    feel_drag(physics, members[row], sums[row]);
+  for (int row = 0; row < rows; row += most_open_blocks) {
+    const int left = rows - row;
+    feel_drag(physics, members + row, sums + row,
+              left < most_open_blocks ? left : most_open_blocks);
   }
   pull();
   sum.template operator()<drag_sums_kept>();

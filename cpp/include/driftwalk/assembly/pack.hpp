@@ -41,9 +41,13 @@ public:
     for (int lane = 0; lane < lanes; ++lane) {
       if (lane < worlds) {
         load_lane<Real, T>(rules_, start, memory_, lane);
-        // One assembly until its world begins: blocks of a lane without a world pull at nothing.
+        // One assembly until its world begins: blocks of a lane without a world pull at nothing,
+        // and no water reaches them.
         for (int b = 0; b < blocks_ && !Crowded; ++b) {
           put(memory_.members[b].root, lane, 0);
+          for (auto& face : memory_.members[b].covered) {
+            put(face, lane, true);
+          }
         }
         const int bonds = bond_room(capacity);
         books_[lane].bonds = {memory_.bonds + bonds * lane, 0, bonds};
@@ -182,7 +186,7 @@ public:
       look_at_flow(step);
     }
     const int half = phase < run_.steps_per_interval ? 0 : 1;
-    const auto pull = [this] { feel_pull(); };
+    const auto pull = [this, step] { feel_pull(step); };
     if constexpr (Crowded) {
       const auto sum = [&]<int Count>() { sum_crowd<Count>(memory_.crowd, memory_.sums, rows_); };
       advance(physics_, half, memory_.members, memory_.sums, rows_, sum, pull);
@@ -217,19 +221,21 @@ private:
     }
   }
 
-  void feel_pull() {
+  void feel_pull(std::int64_t step) {
     if (!rules_.pull.on) {
       return;
     }
+    const bool whole = rules_.pull.is_whole(step);
     const Member<Real>* const members = memory_.members;
     Pulled<Real>* const pulled = memory_.pulled;
     for (int row = 0; row < rows_; ++row) {
       look_at(physics_, members[row], pulled[row]);
     }
     if constexpr (Crowded) {
-      pull_crowd(rules_.pull, members, pulled, blocks_, listed_ ? &scratch_.scene.pairs : nullptr);
+      pull_crowd(rules_.pull, whole, members, pulled, blocks_,
+                 listed_ ? &scratch_.scene.pairs : nullptr);
     } else {
-      pull_all(rules_.pull, members, pulled, blocks_);
+      pull_all(rules_.pull, whole, members, pulled, blocks_);
     }
     for (int row = 0; row < rows_; ++row) {
       add_pull(physics_, run_, members[row], pulled[row], memory_.sums[row]);

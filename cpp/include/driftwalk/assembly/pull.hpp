@@ -78,6 +78,42 @@ inline float end_of(const RadialTable& table) {
   return end;
 }
 
+// The squared distance from which on a step has none of a force of faces.
+inline double end_in_step(const PullRules& rules, bool whole, double end) {
+  return whole || end < rules.near_end ? end : rules.near_end;
+}
+inline double reach_in_step(const PullRules& rules, bool whole) {
+  return whole ? rules.reach : rules.near_reach;
+}
+
+// A number that falls from 1 to 0 between two squared distances, and its slope.
+template <class Real>
+struct Fade {
+  using T = typename Numbers<Real>::Scalar;
+  Real from, per;
+
+  Fade(double fading, double end)
+      : from{static_cast<T>(fading)}, per{static_cast<T>(1 / (end - fading))} {}
+  Real part(Real squared) const {
+    return min(max((squared - from) * per, Real(T(0))), Real(T(1)));
+  }
+  Real value(Real at) const { return Real(T(1)) - at * at * (Real(T(3)) - Real(T(2)) * at); }
+  Real slope(Real at) const { return Real(T(-6)) * at * (Real(T(1)) - at) * per; }
+};
+
+// The share of a force of faces that acts in a step.
+template <class Real>
+struct StepShare {
+  using T = typename Numbers<Real>::Scalar;
+  Fade<Real> near;
+  Real far, more;
+
+  StepShare(const PullRules& rules, bool whole)
+      : near(rules.near_fading, rules.near_end), far{static_cast<T>(whole ? rules.every : 0)},
+        more{static_cast<T>(whole ? 1 - rules.every : 1)} {}
+  Real value(Real at) const { return far + more * near.value(at); }
+};
+
 // An attraction `strength` times the way (dx, dy) from the first to the second.
 template <class Real>
 inline void attract(Real strength, Real dx, Real dy, Pulled<Real>& a, Pulled<Real>& b) {
@@ -117,9 +153,12 @@ inline void turn_towards(Real x, Real y, Pulled<Real>& block) {
 }
 
 template <class Real>
-inline void pull_faces(const PullRules& rules, Real dx, Real dy, Pulled<Real>& a, Pulled<Real>& b) {
+inline void pull_faces(const PullRules& rules, bool whole, Real dx, Real dy, Pulled<Real>& a,
+                       Pulled<Real>& b) {
   using T = typename Numbers<Real>::Scalar;
-  const Real lever{static_cast<T>(rules.lever)}, end{static_cast<T>(end_of(rules.faces))};
+  const Real lever{static_cast<T>(rules.lever)};
+  const Real end{static_cast<T>(end_in_step(rules, whole, end_of(rules.faces)))};
+  const StepShare<Real> share(rules, whole);
   turn_towards(dx, dy, a);
   turn_towards(-dx, -dy, b);
   const FacePoints<Real> first(a.axes, lever), second(b.axes, lever);
@@ -134,7 +173,8 @@ inline void pull_faces(const PullRules& rules, Real dx, Real dy, Pulled<Real>& a
       if (!any((squared < end) & (poles != none))) {
         continue;
       }
-      const Real strength = look_up(rules.faces, squared) * poles;
+      const Real strength =
+          look_up(rules.faces, squared) * poles * share.value(share.near.part(squared));
       const Real force_x = strength * way_x, force_y = strength * way_y;
       sum_x = sum_x + force_x;
       sum_y = sum_y + force_y;
@@ -240,19 +280,20 @@ inline void pull_oriented(const PullRules& rules, T dx, T dy, Pulled<T>& a, Pull
 
 // Of multipoles; returns the least squared distance of two faces.
 template <class Real>
-inline Real pull_multipoles(const PullRules& rules, Real dx, Real dy, Pulled<Real>& a,
+inline Real pull_multipoles(const PullRules& rules, bool whole, Real dx, Real dy, Pulled<Real>& a,
                             Pulled<Real>& b) {
   using T = typename Numbers<Real>::Scalar;
   const auto number = [](double value) { return Real(static_cast<T>(value)); };
   const Multipoles& far = rules.multipoles;
   const Real lever = number(rules.lever), softening = number(far.softening);
-  const Real end = number(far.end), fading = number(far.fading);
-  const Real per_fade = number(1 / (far.end - far.fading));
+  const Real end = number(end_in_step(rules, whole, far.end));
+  const Fade<Real> fade(far.fading, far.end);
+  const StepShare<Real> share(rules, whole);
   Real c[6];
   for (int k = 0; k < 6; ++k) {
     c[k] = number(far.coefficient[k]);
   }
-  const Real none = number(0), one = number(1), two = number(2), three = number(3);
+  const Real none = number(0), one = number(1), two = number(2);
   const Real sign = number(rules.like_poles_repel ? -1 : 1);
   turn_towards(dx, dy, a);
   turn_towards(-dx, -dy, b);
@@ -280,11 +321,12 @@ inline Real pull_multipoles(const PullRules& rules, Real dx, Real dy, Pulled<Rea
       const Real energy = w * by_w + u * by_u;
       // Minus twice the derivative by the squared distance, over h^5.
       const Real steep = number(5) * energy + two * (u * by_u + v * by_v - w * c[0] - u * c[3]);
-      const Real part = min(max((squared - fading) * per_fade, none), one);
+      const Real last = fade.part(squared), near = share.near.part(squared);
+      const Real left = fade.value(last), acting = share.value(near);
       const Real felt = poles * hhh;
-      const Real scaled = felt * (one - part * part * (three - two * part));
-      const Real strength =
-          scaled * hh * steep + felt * energy * (number(12) * part * (one - part) * per_fade);
+      const Real scaled = felt * (left * acting);
+      const Real fall = fade.slope(last) * acting + left * (share.more * share.near.slope(near));
+      const Real strength = scaled * hh * steep - felt * energy * (two * fall);
       // The energy's derivatives by the way along the two normals, and by the cosine.
       const Real per_way = scaled * hh;
       const Real by_first = per_way * (inward * by_u + two * along * by_v);
@@ -336,7 +378,8 @@ public:
     int row, lane;
   };
 
-  PullPairs(const PullRules& rules, Pulled<Real>* pulled) : rules_(rules), pulled_(pulled) {}
+  PullPairs(const PullRules& rules, bool whole, Pulled<Real>* pulled)
+      : rules_(rules), whole_(whole), pulled_(pulled) {}
 
   void add(Place first, Place second) {
     place_[0][count_] = first;
@@ -360,11 +403,11 @@ public:
       attract(look_up(rules_.resistance, squared) * parting, dx, dy, a, b);
     }
     if (rules_.faces.cells > 0) {
-      pull_faces(rules_, dx, dy, a, b);
+      pull_faces(rules_, whole_, dx, dy, a, b);
     }
     if (rules_.oriented.distances > 0) {
       const Real nearest =
-          rules_.multipoles.on ? pull_multipoles(rules_, dx, dy, a, b) : Real(T(0));
+          rules_.multipoles.on ? pull_multipoles(rules_, whole_, dx, dy, a, b) : Real(T(0));
       const Real high{static_cast<T>(rules_.oriented.high * rules_.oriented.high)};
       for_lanes(lanes, nearest < high, [&](int pair) {
         if (pair >= count_) {
@@ -413,6 +456,7 @@ private:
   }
 
   const PullRules& rules_;
+  bool whole_; // whether distant faces act in this step
   Pulled<Real>* pulled_;
   Place place_[2][lanes];
   int count_ = 0;
@@ -455,11 +499,12 @@ inline void add_pull(const Physics<Real, T, Law>& physics, const Prepared<T>& ru
 }
 
 template <class Real>
-inline void pull_all(const PullRules& rules, const Member<Real>* members, Pulled<Real>* pulled,
-                     int blocks) {
+inline void pull_all(const PullRules& rules, bool whole, const Member<Real>* members,
+                     Pulled<Real>* pulled, int blocks) {
   using T = typename Numbers<Real>::Scalar;
-  PullPairs<Real> pairs(rules, pulled);
-  const Real reach{static_cast<T>(rules.reach * rules.reach)};
+  PullPairs<Real> pairs(rules, whole, pulled);
+  const double far = reach_in_step(rules, whole);
+  const Real reach{static_cast<T>(far * far)};
   for (int a = 0; a < blocks; ++a) {
     for (int b = a + 1; b < blocks; ++b) {
       const Real dx = pulled[b].x - pulled[a].x, dy = pulled[b].y - pulled[a].y;
@@ -475,12 +520,13 @@ inline void pull_all(const PullRules& rules, const Member<Real>* members, Pulled
 
 // The same in one world whose blocks are in the lanes, from its list of near pairs; of no list all.
 template <class Real>
-inline void pull_crowd(const PullRules& rules, const Member<Real>* members, Pulled<Real>* pulled,
-                       int blocks, const PairList* list) {
+inline void pull_crowd(const PullRules& rules, bool whole, const Member<Real>* members,
+                       Pulled<Real>* pulled, int blocks, const PairList* list) {
   using T = typename Numbers<Real>::Scalar;
   constexpr unsigned lanes = Numbers<Real>::lanes; // so that to divide is to shift
-  PullPairs<Real> pairs(rules, pulled);
-  const T reach = static_cast<T>(rules.reach * rules.reach);
+  PullPairs<Real> pairs(rules, whole, pulled);
+  const double far = reach_in_step(rules, whole);
+  const T reach = static_cast<T>(far * far);
   const auto look = [&](int first, int second) {
     const int a = static_cast<int>(first / lanes), at_a = static_cast<int>(first % lanes);
     const int b = static_cast<int>(second / lanes), at_b = static_cast<int>(second % lanes);

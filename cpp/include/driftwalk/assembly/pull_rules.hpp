@@ -1,6 +1,8 @@
 // How blocks pull at each other from a distance: tables, plain data.
 #pragma once
 
+#include <cstdint>
+
 namespace driftwalk {
 
 // A function of the squared distance, linear within cells of 1/64 of an octave: its value at the
@@ -46,6 +48,14 @@ struct PullRules {
   double lever = 0;              // of these points, from the centre of the block [m]
   double pole[4] = {1, 1, 1, 1}; // of the faces, in the block's own frame
   bool like_poles_repel = false;
+  // Between two distances a force of faces goes over from one that acts in each step to one that
+  // acts in every `every`-th only, as many times as strong (impulses of r-RESPA).
+  int every = 1;
+  double near_fading = 0, near_end = 1; // squares of these distances [m^2]
+  double near_reach = 0;                // as `reach`, in the steps between
+
+  // Whether distant faces act in a time step: in the middle of so many.
+  bool is_whole(std::int64_t step) const { return step % every == every / 2; }
 };
 
 } // namespace driftwalk

@@ -4,6 +4,8 @@
 
 #include "driftwalk/assembly/pack.hpp"
 
+#include <numeric>
+
 DRIFTWALK_LANES_BEGIN
 
 template <class Real, class T, class Law, bool Crowded = Numbers<Real>::lanes == 1>
@@ -19,8 +21,8 @@ public:
 
   // Returns the number of block-steps of the worlds that were run.
   std::int64_t run() {
-    // Lanes take a new world where a block of random numbers begins.
-    const std::int64_t period = pack_.period();
+    // Lanes take a new world where a block of random numbers begins, and a cycle of distant pulls.
+    const std::int64_t period = std::lcm(pack_.period(), rules_.pull.every);
     for (std::int64_t step = 0;; ++step) {
       if (step % period == 0 && !refill(step)) {
         return block_steps_;

@@ -31,6 +31,19 @@ inline void store_cells(IntPack<N> cell, Int32* at) {
   std::memcpy(at, &cell.v, sizeof cell.v);
 }
 
+// As above, for loads of single doubles.
+template <int N>
+inline void store_parts(DoublePack<N> values, double* at) {
+#if defined(DRIFTWALK_USE_X86) && defined(__AVX512F__)
+  if constexpr (N == 8) {
+    _mm256_storeu_pd(at, _mm512_castpd512_pd256((__m512d)values.v));
+    _mm256_storeu_pd(at + 4, _mm512_extractf64x4_pd((__m512d)values.v, 1));
+    return;
+  }
+#endif
+  std::memcpy(at, &values.v, sizeof values.v);
+}
+
 // Where a lane's cell is: in the one table of all lanes, or in its own.
 inline const std::int16_t* cell_of(const std::int16_t* table, int, Int32 at) {
   return table + flow_record * std::int64_t(at);
@@ -257,22 +270,11 @@ inline void look_up(const FlowView<double>& flow, double x, double y, double& u,
   v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) + (record[3] * (1 - fx) + next[3] * fx) * fy;
 }
 
-// The four numbers of each lane's record, `from` of them further on than its cell's first.
-template <int N, class Tables>
-[[gnu::always_inline]] inline void load_record(Tables tables, const Int32* at, int from,
-                                               DoublePack<N>* out) {
-  using Record = VectorOf<double, flow_record>::type;
-  const auto of = [&](int lane) {
-    const double* table;
-    if constexpr (std::is_same_v<Tables, const double*>) {
-      table = tables;
-    } else {
-      table = tables[lane];
-    }
-    Record found;
-    std::memcpy(&found, table + flow_record * std::int64_t(at[lane]) + from, sizeof found);
-    return found;
-  };
+using FlowRecord = VectorOf<double, flow_record>::type;
+
+// A record of each lane, `of(lane)`, as packs of its four numbers.
+template <int N, class Of>
+[[gnu::always_inline]] inline void transpose_records(const Of& of, DoublePack<N>* out) {
   if constexpr (N == 8) {
     const auto two = [&](int k) {
 #if defined(DRIFTWALK_USE_X86) && defined(__AVX512F__)
@@ -292,25 +294,38 @@ template <int N, class Tables>
     out[2].v = __builtin_shufflevector(even_low, even_high, 2, 3, 6, 7, 10, 11, 14, 15);
     out[3].v = __builtin_shufflevector(odd_low, odd_high, 2, 3, 6, 7, 10, 11, 14, 15);
   } else if constexpr (N == 4) {
-    const Record a = of(0), b = of(1), c = of(2), d = of(3);
-    const Record even_low = __builtin_shufflevector(a, b, 0, 4, 2, 6);
-    const Record odd_low = __builtin_shufflevector(a, b, 1, 5, 3, 7);
-    const Record even_high = __builtin_shufflevector(c, d, 0, 4, 2, 6);
-    const Record odd_high = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+    const FlowRecord a = of(0), b = of(1), c = of(2), d = of(3);
+    const FlowRecord even_low = __builtin_shufflevector(a, b, 0, 4, 2, 6);
+    const FlowRecord odd_low = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    const FlowRecord even_high = __builtin_shufflevector(c, d, 0, 4, 2, 6);
+    const FlowRecord odd_high = __builtin_shufflevector(c, d, 1, 5, 3, 7);
     out[0].v = __builtin_shufflevector(even_low, even_high, 0, 1, 4, 5);
     out[1].v = __builtin_shufflevector(odd_low, odd_high, 0, 1, 4, 5);
     out[2].v = __builtin_shufflevector(even_low, even_high, 2, 3, 6, 7);
     out[3].v = __builtin_shufflevector(odd_low, odd_high, 2, 3, 6, 7);
   } else {
     static_assert(N == 2);
-    const Record a = of(0), b = of(1);
+    const FlowRecord a = of(0), b = of(1);
     for (int k = 0; k < flow_record; ++k) {
       out[k].v = typename DoublePack<N>::Vector{a[k], b[k]};
     }
   }
 }
 
-// The same for a pack.
+// What stands at a place of a lane's table or, in a flow in frames, between its two.
+inline FlowRecord record_of(const FlowView<double>& flow, int lane, std::int64_t place) {
+  FlowRecord found, after;
+  if (flow.lanes == nullptr) {
+    std::memcpy(&found, flow.table + place, sizeof found);
+    return found;
+  }
+  std::memcpy(&found, flow.lanes->before[lane] + place, sizeof found);
+  std::memcpy(&after, flow.lanes->after[lane] + place, sizeof after);
+  return blend(found, after, FlowRecord{} + flow.lanes->weight[lane]);
+}
+
+// The same for a pack. What a lane's record and the next one come to is found before the lanes are
+// transposed: half as many numbers.
 template <int N>
 [[gnu::always_inline]] inline void look_up(const FlowView<double>& flow, DoublePack<N> x,
                                            DoublePack<N> y, DoublePack<N>& u, DoublePack<N>& v) {
@@ -320,25 +335,22 @@ template <int N>
   store_cells((row << flow.stride_bits) + column, at);
   keep_stored(at);
   const Real fx = x - to_real(x, column), fy = y - to_real(y, row);
-  Real near[flow_record], next[flow_record];
-  if (flow.lanes == nullptr) {
-    load_record(flow.table, at, 0, near);
-    load_record(flow.table, at, flow_record, next);
-  } else {
-    Real after[2 * flow_record], weight;
-    load_record(flow.lanes->before, at, 0, near);
-    load_record(flow.lanes->before, at, flow_record, next);
-    load_record(flow.lanes->after, at, 0, after);
-    load_record(flow.lanes->after, at, flow_record, after + flow_record);
-    load_lanes(flow.lanes->weight, weight);
-    for (int k = 0; k < flow_record; ++k) {
-      near[k] = blend(near[k], after[k], weight);
-      next[k] = blend(next[k], after[k + flow_record], weight);
-    }
-  }
   const Real left = 1.0 - fx, below = 1.0 - fy;
-  u = (near[0] * left + next[0] * fx) * below + (near[1] * left + next[1] * fx) * fy;
-  v = (near[2] * left + next[2] * fx) * below + (near[3] * left + next[3] * fx) * fy;
+  alignas(64) double part[N], next_part[N];
+  store_parts(left, part);
+  store_parts(fx, next_part);
+  keep_stored(part);
+  keep_stored(next_part);
+  Real record[flow_record];
+  transpose_records<N>(
+      [&](int lane) {
+        const std::int64_t place = flow_record * std::int64_t(at[lane]);
+        return record_of(flow, lane, place) * part[lane] +
+               record_of(flow, lane, place + flow_record) * next_part[lane];
+      },
+      record);
+  u = record[0] * below + record[1] * fy;
+  v = record[2] * below + record[3] * fy;
 }
 
 // Walks along a row and reads the flow at each place. Velocities come out divided by the table's

@@ -32,60 +32,95 @@ struct AllFacesOpen {
   }
 };
 
-// The sums over all strips, in a flow (u, v) in units of the flow table, face after face. `closing`
-// is the closing speed of each face's first strip in still water. Not inlined, because the caller's
-// numbers would take registers that the loop needs.
+// Sums over the strips of one face: of f, of its running sums, of g u, g v and g.
+template <class Real>
+struct FaceSums {
+  Real push, running, u, v, g;
+};
+
+// A face in the water: its outward normal, the closing speed of its first strip in still water, how
+// much less each next one closes, and the speed along the face.
+template <class Real>
+struct FaceMotion {
+  Real nx, ny, closing, spin_step, past;
+
+  template <class T>
+  FaceMotion(const BlockShape<T>& block, const Motion<Real>& motion, Real normal_x, Real normal_y,
+             Real closing_first)
+      : nx(normal_x), ny(normal_y), closing(closing_first),
+        spin_step(motion.omega * block.strip_width),
+        past((-ny * motion.vx + nx * motion.vy) + motion.omega * block.half_side) {}
+  FaceMotion() = default;
+};
+
+// The flow (u, v) at the strips is in units of the flow table.
 template <class Real, class T, class Law>
-[[gnu::noinline]] DragSums<Real> sum_strips(const Law& law, const BlockShape<T>& block, T unit,
-                                            const Axes<Real>& axes, const Motion<Real>& motion,
-                                            const Real* closing, const Real* u, const Real* v) {
-  const T h = block.half_side, w = block.strip_width;
-  const int strips = block.strips;
+[[gnu::always_inline]] inline FaceSums<Real> sum_face(const Law& law, int strips, T unit,
+                                                      const FaceMotion<Real>& face, const Real* u,
+                                                      const Real* v) {
   const Real zero{T(0)};
-  const Real spin_step = motion.omega * w;
-  DragSums<Real> sums{zero, zero, zero, zero};
-  Real nx = axes.cosine, ny = axes.sine;
-  for (int face = 0; face < 4; ++face) {
-    const Real tx = -ny, ty = nx;
-    const Real raw_nx = nx * unit, raw_ny = ny * unit;
-    const Real past = (tx * motion.vx + ty * motion.vy) + motion.omega * h; // along the face
-    Real closes = closing[face];
-    Real push = zero, running = zero, sum_u = zero, sum_v = zero, sum_g = zero;
-    for (int k = 0; k < strips; ++k, ++u, ++v) {
-      const Real s = closes - (raw_nx * *u + raw_ny * *v);
-      Real g;
-      if constexpr (DragLawBySpeed<Law, Real>) {
-        g = law.conductance(s, (tx * unit * *u + ty * unit * *v) - past);
-        push = push + g * s;
-      } else {
-        g = law.conductance(s);
-        push = push + law.force(s);
-      }
-      running = running + push;
-      sum_u = sum_u + g * *u;
-      sum_v = sum_v + g * *v;
-      sum_g = sum_g + g;
-      closes = closes - spin_step;
+  const Real tx = -face.ny, ty = face.nx;
+  const Real raw_nx = face.nx * unit, raw_ny = face.ny * unit;
+  Real closes = face.closing;
+  FaceSums<Real> sums{zero, zero, zero, zero, zero};
+  for (int k = 0; k < strips; ++k, ++u, ++v) {
+    const Real s = closes - (raw_nx * *u + raw_ny * *v);
+    Real g;
+    if constexpr (DragLawBySpeed<Law, Real>) {
+      g = law.conductance(s, (tx * unit * *u + ty * unit * *v) - face.past);
+      sums.push = sums.push + g * s;
+    } else {
+      g = law.conductance(s);
+      sums.push = sums.push + law.force(s);
     }
-    const Real tangential = (tx * sum_u + ty * sum_v) * unit - past * sum_g;
-    sums.force_x = sums.force_x + (tx * tangential - nx * push);
-    sums.force_y = sums.force_y + (ty * tangential - ny * push);
-    const Real lever = push * (T(0.5) * T(strips + 1)) - running;
-    sums.torque = sums.torque + (tangential * h + lever * w);
-    sums.conductance = sums.conductance + sum_g;
-    nx = tx;
-    ny = ty;
+    sums.running = sums.running + sums.push;
+    sums.u = sums.u + g * *u;
+    sums.v = sums.v + g * *v;
+    sums.g = sums.g + g;
+    closes = closes - face.spin_step;
   }
   return sums;
 }
 
-// The sums at a place on the table, or at its edge: a NaN or a runaway reads no memory beyond it.
-// `cover(face, closing)` may turn the closing speed of a face's first strip into
-// closing_where_covered.
-template <class Real, class T, DragLaw<Real> Law, class Cover = AllFacesOpen>
-inline DragSums<Real> drag_sums(const Law& law, const BlockShape<T>& block, const FlowView<T>& flow,
-                                Real x, Real y, const Axes<Real>& axes, const Motion<Real>& motion,
-                                const Cover& cover = {}) {
+template <class Real, class T>
+[[gnu::always_inline]] inline void add_face(const BlockShape<T>& block, T unit,
+                                            const FaceMotion<Real>& face,
+                                            const FaceSums<Real>& found, DragSums<Real>& sums) {
+  const Real tx = -face.ny, ty = face.nx;
+  const Real tangential = (tx * found.u + ty * found.v) * unit - face.past * found.g;
+  sums.force_x = sums.force_x + (tx * tangential - face.nx * found.push);
+  sums.force_y = sums.force_y + (ty * tangential - face.ny * found.push);
+  const Real lever = found.push * (T(0.5) * T(block.strips + 1)) - found.running;
+  sums.torque = sums.torque + (tangential * block.half_side + lever * block.strip_width);
+  sums.conductance = sums.conductance + found.g;
+}
+
+// The sums over all strips, face after face. `closing` is the closing speed of each face's first
+// strip in still water. Not inlined, because the caller's numbers would take registers that the
+// loop needs.
+template <class Real, class T, class Law>
+[[gnu::noinline]] DragSums<Real> sum_strips(const Law& law, const BlockShape<T>& block, T unit,
+                                            const Axes<Real>& axes, const Motion<Real>& motion,
+                                            const Real* closing, const Real* u, const Real* v) {
+  const Real zero{T(0)};
+  DragSums<Real> sums{zero, zero, zero, zero};
+  Real nx = axes.cosine, ny = axes.sine;
+  for (int face = 0; face < 4; ++face, u += block.strips, v += block.strips) {
+    const FaceMotion<Real> moving(block, motion, nx, ny, closing[face]);
+    add_face(block, unit, moving, sum_face(law, block.strips, unit, moving, u, v), sums);
+    const Real tx = -ny;
+    ny = nx;
+    nx = tx;
+  }
+  return sums;
+}
+
+// The rows of strips of the four faces and the closing speed of the first of each, at a place on
+// the table, or at its edge: a NaN or a runaway reads no memory beyond it.
+template <class Real, class T>
+[[gnu::always_inline]] inline void
+find_faces(const BlockShape<T>& block, const FlowView<T>& flow, Real x, Real y,
+           const Axes<Real>& axes, const Motion<Real>& motion, FlowRow<Real>* rows, Real* closing) {
   const T h = block.half_side;
   const T w = block.strip_width;
   const T first_offset = w * T(0.5) - h;
@@ -94,8 +129,6 @@ inline DragSums<Real> drag_sums(const Law& law, const BlockShape<T>& block, cons
   const Real centre_x = (on_table_x - flow.origin_x) * flow.per_spacing_x;
   const Real centre_y = (on_table_y - flow.origin_y) * flow.per_spacing_y;
   const Real first_turns = motion.omega * first_offset;
-  FlowRow<Real> rows[4];
-  Real closing[4];
   Real nx = axes.cosine, ny = axes.sine;
   // Two neighbouring faces; those opposite are their mirror images.
   for (int face = 0; face < 2; ++face) {
@@ -106,10 +139,24 @@ inline DragSums<Real> drag_sums(const Law& law, const BlockShape<T>& block, cons
                                ty * (w * flow.per_spacing_y));
     rows[face + 2] = rows[face].backwards_from(centre_x - out_x, centre_y - out_y);
     const Real ahead = nx * motion.vx + ny * motion.vy;
-    closing[face] = cover(face, ahead - first_turns);
-    closing[face + 2] = cover(face + 2, -ahead - first_turns);
+    closing[face] = ahead - first_turns;
+    closing[face + 2] = -ahead - first_turns;
     nx = tx;
     ny = ty;
+  }
+}
+
+// The sums at a place. `cover(face, closing)` may turn the closing speed of a face's first strip
+// into closing_where_covered.
+template <class Real, class T, DragLaw<Real> Law, class Cover = AllFacesOpen>
+inline DragSums<Real> drag_sums(const Law& law, const BlockShape<T>& block, const FlowView<T>& flow,
+                                Real x, Real y, const Axes<Real>& axes, const Motion<Real>& motion,
+                                const Cover& cover = {}) {
+  FlowRow<Real> rows[4];
+  Real closing[4];
+  find_faces(block, flow, x, y, axes, motion, rows, closing);
+  for (int face = 0; face < 4; ++face) {
+    closing[face] = cover(face, closing[face]);
   }
   // Side by side, so that they do not compete for the same places in the cache.
   Real water[2 * 4 * most_strips];

@@ -16,6 +16,7 @@ from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.pull.magnets import coaxial_force, magnet_energy
 from driftwalk.assembly.pull.measured import MeasuredAttraction, read_attraction
 from driftwalk.assembly.pull.multipoles import MULTIPOLES, Energy, Multipoles, fit_multipoles
+from driftwalk.assembly.pull.stepping import EACH_STEP, Stepping, stepping_of
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.model.interaction import Interaction, Magnet
@@ -120,12 +121,17 @@ class PullTables(NamedTuple):
     """Energy of two faces: its coefficients on (distance, direction, angle), and where they are."""
     multipoles: Multipoles | None
     """Energy of two faces in closed form, to which the one on (distance, ...) is added."""
+    stepping: Stepping = EACH_STEP
+    """Which forces of faces act in each step."""
+    near_reach: float = 0.0
+    """As `reach`, in the steps in which distant forces do not act [m]."""
 
     def native(self) -> _core.Pull:
         """Return the native core's form of the tables."""
         made = _core.Pull(
-            reach=self.reach, lever=self.lever, pole=np.ones(4), like_poles_repel=False
-        )
+            reach=self.reach, lever=self.lever, pole=np.ones(4), like_poles_repel=False,
+            near_reach=self.near_reach, **self.stepping._asdict(),
+        )  # fmt: skip
         for what, (cells, first) in self.radial.items():
             made.set_radial(what, cells, first)
         if self.oriented is not None:
@@ -249,10 +255,8 @@ def _block_pull(
         oriented, end = measured.flat_below(faces.capped_at).energy, measured.farthest
     elif faces is not None and magnet is not None and given.poles == "fixed":
         oriented, far = _fixed_poles(magnet, faces)
-    reach = max(
-        0.0 if faces is None else end + 2.0 * lever,
-        *(0.0 if force is None else force.cutoff for force in (centres, resistance)),
-    )
+    others = [force.cutoff for force in (centres, resistance) if force is not None]
+    reach = max([0.0 if faces is None else end + 2.0 * lever, *others])
     radial: dict[str, RadialForce | None] = {"centres": centres, "resistance": resistance}
     tables = PullTables(reach, lever, {}, None, far)
     if faces is not None and oriented is None:
@@ -263,10 +267,27 @@ def _block_pull(
         tables = tables._replace(
             oriented=_oriented(oriented, faces.contact, end, of_magnets=far is not None)
         )
+    if faces is not None and magnet is not None:
+        nearest = max(faces.capped_at, end if far is not None else 0.0)
+        tables = _stepped(tables, faces, nearest=nearest, mass=mass, step=step, others=others)
     tables.radial.update(
         {what: force.cells() for what, force in radial.items() if force is not None}
     )
     return BlockPull(faces, lever, centres, resistance, tables, tables.native())
+
+
+def _stepped(
+    tables: PullTables,
+    faces: RadialForce,
+    *,
+    nearest: float,
+    mass: float,
+    step: float,
+    others: list[float],
+) -> PullTables:
+    found = stepping_of(faces, nearest=nearest, cutoff=faces.cutoff, mass=mass, step=step)
+    near = math.sqrt(found.near_end) + 2.0 * tables.lever
+    return tables._replace(stepping=found, near_reach=max([near, *others]))
 
 
 def _require_poles(study: Study) -> None:

@@ -174,6 +174,8 @@ def _pull(study: Study | None) -> dict[str, Any] | None:
     return {
         "reach": tables.reach,
         "lever": tables.lever,
+        **tables.stepping._asdict(),
+        "near_reach": tables.near_reach,
         "radial": [
             {"what": what, "cells": _doubles(cells), "first": first}
             for what, (cells, first) in tables.radial.items()
