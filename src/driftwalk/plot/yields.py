@@ -9,6 +9,7 @@ import numpy as np
 from driftwalk.plot.assembly_courses import TIME_LABEL
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import check_kind
+from driftwalk.plot.parts.labels import set_symbols
 from driftwalk.schema.answers.yields import setting_words
 from driftwalk.schema.shapes import short_class
 
@@ -56,7 +57,7 @@ def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ahead = np.bincount(found["front_setting"].values, minlength=found.sizes["setting"])
     ahead[int(found.attrs["best"])] += time.size
     for at in np.argsort(-ahead, kind="stable")[: int((ahead > 0).sum())]:
-        ax.plot(time, found["share"].values[at], label=setting_words(found, int(at)))
+        ax.plot(time, found["share"].values[at], label=set_symbols(setting_words(found, int(at))))
     by = found.attrs["by_s"]
     ax.axvline(by, color=style.MUTED, lw=0.6, ls="--", label=f"deadline {by:g} s")
     target = short_class(str(found.attrs["target"]))
@@ -116,7 +117,7 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.axvspan(
         -within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"grey: within {100 * within:g} %"
     )
-    words = [setting_words(found, int(at)) for at in order]
+    words = [set_symbols(setting_words(found, int(at))) for at in order]
     ax.set_yticks(range(len(order)), words)
     ax.invert_yaxis()
     ax.set_xlabel("yield less that of the best")
