@@ -194,7 +194,7 @@ def front_table(found: xr.Dataset) -> Table:
         for at in tenths
     ]
     share_words = f"{found.attrs['confidence']:.0%} interval"
-    return Table(rows, ["time [s]", "yield", share_words, "setting"], "front of yield and time")
+    return Table(rows, ["time (s)", "yield", share_words, "setting"], "front of yield and time")
 
 
 def _facts(found: xr.Dataset) -> dict[str, Any]:
