@@ -10,7 +10,7 @@ from driftwalk.plot.assembly_courses import TIME_LABEL
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import check_kind
 from driftwalk.plot.parts.labels import set_symbols
-from driftwalk.schema.answers.yields import setting_words
+from driftwalk.schema.answers.yields import point_words, varied
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -52,12 +52,13 @@ def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     time = found["time"].values
     ax.fill_between(
         time, found["front_yield_low"], found["front_yield_high"], color=style.MUTED, alpha=0.3,
-        lw=0, label="best of each time",
+        lw=0, label=f"best of each time, {found.attrs['confidence']:.0%} interval",
     )  # fmt: skip
     ahead = np.bincount(found["front_setting"].values, minlength=found.sizes["setting"])
     ahead[int(found.attrs["best"])] += time.size
+    words, shared = _setting_labels(found)
     for at in np.argsort(-ahead, kind="stable")[: int((ahead > 0).sum())]:
-        ax.plot(time, found["share"].values[at], label=set_symbols(setting_words(found, int(at))))
+        ax.plot(time, found["share"].values[at], label=words[at])
     by = found.attrs["by_s"]
     ax.axvline(by, color=style.MUTED, lw=0.6, ls="--", label=f"deadline {by:g} s")
     target = short_class(str(found.attrs["target"]))
@@ -65,6 +66,7 @@ def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
         xlabel=TIME_LABEL, ylabel=f"share of runs with {target}", xlim=(time[0], time[-1]),
         ylim=(0.0, None),
     )  # fmt: skip
+    ax.set_title(shared, loc="left")
     ax.legend()
     ax.spines[["top", "right"]].set_visible(False)
     return ax
@@ -117,10 +119,10 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.axvspan(
         -within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"grey: within {100 * within:g} %"
     )
-    words = [set_symbols(setting_words(found, int(at))) for at in order]
-    ax.set_yticks(range(len(order)), words)
+    words, shared = _setting_labels(found)
+    ax.set_yticks(range(len(order)), [words[at] for at in order])
     ax.invert_yaxis()
-    ax.set_xlabel("yield less that of the best")
+    ax.set_xlabel("\n".join(filter(None, ["yield less that of the best", shared])))
     ax.spines[["top", "right"]].set_visible(False)
     handles, texts = ax.get_legend_handles_labels()
     keys = dict(zip(texts, handles, strict=True))
@@ -132,3 +134,14 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
         # Long labels are wider in the file than as the layout measures them.
         engine.set(w_pad=0.1)
     return ax
+
+
+def _setting_labels(found: xr.Dataset) -> tuple[list[str], str]:
+    """Return what tells the settings apart, of each, and what all have in common."""
+    names = varied(found)
+    several = [name for name in names if len(set(found[name].values.tolist())) > 1] or names
+    each = [
+        {name: found[name].values[at] for name in several} for at in range(found.sizes["setting"])
+    ]
+    shared = {name: found[name].values[0] for name in names if name not in several}
+    return [set_symbols(point_words(one)) for one in each], set_symbols(point_words(shared))

@@ -52,11 +52,11 @@ AXIS_NUMBERS: Final = {
         Number("magnets"),
     )
 }
-"""What a reader calls them, in the order from x to y."""
+"""Their words, symbols and units for a reader, in the order from x to y."""
 
 
 def axis_number(name: str) -> Number:
-    """Return what a reader calls an axis of a map, and its unit."""
+    """Return the words, the symbol and the unit of an axis for a reader."""
     return AXIS_NUMBERS.get(name, Number(name))
 
 
