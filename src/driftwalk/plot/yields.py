@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.plot.assembly_courses import TIME_LABEL
 from driftwalk.plot.parts import style
@@ -52,13 +53,14 @@ def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     time = found["time"].values
     ax.fill_between(
         time, found["front_yield_low"], found["front_yield_high"], color=style.MUTED, alpha=0.3,
-        lw=0, label=f"best of each time, {found.attrs['confidence']:.0%} interval",
+        lw=0, label=f"best of each time, {100 * found.attrs['confidence']:.3g} % interval",
     )  # fmt: skip
     ahead = np.bincount(found["front_setting"].values, minlength=found.sizes["setting"])
     ahead[int(found.attrs["best"])] += time.size
-    words, shared = _setting_labels(found)
-    for at in np.argsort(-ahead, kind="stable")[: int((ahead > 0).sum())]:
-        ax.plot(time, found["share"].values[at], label=words[at])
+    leading = np.argsort(-ahead, kind="stable")[: int((ahead > 0).sum())]
+    words, shared = _setting_labels(found, leading)
+    for at, label in zip(leading, words, strict=True):
+        ax.plot(time, found["share"].values[at], label=label)
     by = found.attrs["by_s"]
     ax.axvline(by, color=style.MUTED, lw=0.6, ls="--", label=f"deadline {by:g} s")
     target = short_class(str(found.attrs["target"]))
@@ -119,9 +121,10 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.axvspan(
         -within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"grey: within {100 * within:g} %"
     )
-    words, shared = _setting_labels(found)
-    ax.set_yticks(range(len(order)), [words[at] for at in order])
+    words, shared = _setting_labels(found, order)
+    ax.set_yticks(range(len(order)), words)
     ax.invert_yaxis()
+    ax.locator_params(axis="x", nbins=5)
     ax.set_xlabel("\n".join(filter(None, ["yield less that of the best", shared])))
     ax.spines[["top", "right"]].set_visible(False)
     handles, texts = ax.get_legend_handles_labels()
@@ -136,12 +139,11 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _setting_labels(found: xr.Dataset) -> tuple[list[str], str]:
-    """Return what tells the settings apart, of each, and what all have in common."""
-    names = varied(found)
-    several = [name for name in names if len(set(found[name].values.tolist())) > 1] or names
-    each = [
-        {name: found[name].values[at] for name in several} for at in range(found.sizes["setting"])
-    ]
-    shared = {name: found[name].values[0] for name in names if name not in several}
+def _setting_labels(found: xr.Dataset, shown: npt.NDArray[np.intp]) -> tuple[list[str], str]:
+    """Return what tells the shown settings apart, of each, and what they have in common."""
+    points = [{name: found[name].values[at] for name in varied(found)} for at in shown]
+    alike = [name for name in points[0] if all(one[name] == points[0][name] for one in points)]
+    several = [name for name in points[0] if name not in alike or len(points) == 1]
+    each = [{name: one[name] for name in several} for one in points]
+    shared = {name: points[0][name] for name in alike if name not in several}
     return [set_symbols(point_words(one)) for one in each], set_symbols(point_words(shared))
