@@ -60,6 +60,7 @@ html_show_copyright = False
 html_favicon = str(HERE / "static" / "logo.svg")
 html_static_path = [str(HERE / "static")]
 html_css_files = ["pages.css"]
+html_js_files = [("pages.js", {"defer": ""})]
 templates_path = ["theme"]
 html_additional_pages = {"index": "front.html"}
 html_context = {
@@ -77,6 +78,8 @@ sphinx_gallery_conf = {
     "filename_pattern": r"\.py$",
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
+    # Twice the size of a card, so that the words of a whole figure stay sharp.
+    "thumbnail_size": (640, 400),
     "show_memory": False,
     "show_signature": False,
     "remove_config_comments": True,
@@ -88,20 +91,6 @@ sphinx_gallery_conf = {
     "image_scrapers": ("matplotlib",),
     "reset_modules": ("matplotlib",),
 }
-
-
-def crop_thumbnails(app: Any, error: Exception | None) -> None:
-    """Show of a wide figure its first panel: shrunk as a whole it could not be read."""
-    from PIL import Image
-
-    for thumbnail in [] if error else Path(app.outdir, "_images").glob("sphx_glr_*_thumb.png"):
-        whole = thumbnail.with_name(thumbnail.name.replace("_thumb", "_001"))
-        if whole.exists():
-            with Image.open(whole) as picture:
-                width, height = picture.size
-                part = picture.crop((0, 0, min(width, round(1.25 * height)), height))
-                part.thumbnail((400, 320))
-                part.save(thumbnail)
 
 
 def refuse_requests(app: Any, error: Exception | None) -> None:
@@ -127,7 +116,6 @@ def setup(app: object) -> None:
     """Make the pages of the Python names, and the table of contents of the front page's links."""
     write_pages()
     command_pages.write_pages()
-    app.connect("build-finished", crop_thumbnails)  # type: ignore[attr-defined]
     app.connect("build-finished", refuse_requests)  # type: ignore[attr-defined]
     app.connect("source-read", command_pages.move_links)  # type: ignore[attr-defined]
     app.connect("source-read", add_contents)  # type: ignore[attr-defined]

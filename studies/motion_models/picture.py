@@ -119,7 +119,7 @@ def main(out: Path) -> None:
         axes.set_xlabel("x (cm)")
     for axes in panels[:, 0]:
         axes.set_ylabel("y (cm)")
-    figure.colorbar(lines, ax=panels, label="speed [cm/s]", shrink=0.8, extend="max")
+    figure.colorbar(lines, ax=panels, label="speed (cm/s)", shrink=0.8, extend="max")
     out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(out, dpi=110)
 

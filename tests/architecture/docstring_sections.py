@@ -40,12 +40,14 @@ def entries_of(section: str) -> list[tuple[str, str]]:
 
 
 def as_markdown(docstring: str) -> str:
-    """Return a docstring as Markdown: its text, then every section under a bold name.
+    """Return a docstring as Markdown: its text, an example, then each section under a bold name.
 
     Examples keep their prompts, in blocks that are marked ``pycon``; `make doctest` runs them.
     """
     parts = []
-    for name, section in sections_of(docstring).items():
+    sections = sections_of(docstring)
+    for name in sorted(sections, key=lambda one: ("", "Examples", one).index(one)):
+        section = sections[name]
         if not name:
             parts.append(_text(section))
         elif name in ENTRIES:

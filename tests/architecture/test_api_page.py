@@ -128,16 +128,6 @@ It keeps the order:
 
     a, b
 
-**Parameters**
-
-- **`a, b`** : `{"x", "y"}`, optional\\
-  One:
-
-      x
-- **`first`** : `array_like`, shape (n, 2)\\
-  Two lines
-  of text.
-
 **Examples**
 
 ```pycon
@@ -152,7 +142,17 @@ In words:
 
 >>> 3
 3
-```"""
+```
+
+**Parameters**
+
+- **`a, b`** : `{"x", "y"}`, optional\\
+  One:
+
+      x
+- **`first`** : `array_like`, shape (n, 2)\\
+  Two lines
+  of text."""
     assert as_markdown(DOCSTRING) == expected
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -14,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 import jinja2
 import pytest
 from made_up_fit import made_up_check, made_up_fit
+from playwright.sync_api import expect
 from synthetic_calibration import bundled_recording
 
 import driftwalk as dw
@@ -75,7 +77,7 @@ def test_the_front_page(
     one.page.goto(front.as_uri())
     check_readable(one.page)
     names = {Path(url).name for url in one.requests}
-    assert sorted(names) == ["front.css", "front.js", "index.html", "logo.svg"]
+    assert sorted(names) == ["front.css", "front.js", "index.html", "logo.svg", "pages.js"]
     loaded = (front, *(front.parent / "_static" / name for name in names if name != front.name))
     assert sum(path.stat().st_size for path in loaded) < FRONT_BYTES
 
@@ -92,6 +94,41 @@ def test_the_loop_can_be_held_and_stands_still_for_those_who_ask(
     calm = visit(front.parent.as_uri(), reduced_motion="reduce").page
     calm.goto(front.as_uri())
     assert calm.evaluate(running) == 0
+
+
+def test_the_colours_of_the_front_page_can_be_chosen(
+    visit: Callable[..., Visit], front: Path
+) -> None:
+    """The choice is kept, by the name that the theme of the other pages has for it."""
+    page = visit(front.parent.as_uri(), color_scheme="light").page
+    page.goto(front.as_uri())
+    ground = "getComputedStyle(document.body).backgroundColor"
+    light = page.evaluate(ground)
+    page.locator("#colours").press("Enter")
+    assert page.evaluate(ground) != light
+    page.reload()
+    assert page.evaluate("localStorage.getItem('theme')") == "dark"
+    assert page.evaluate(ground) != light
+    expect(page.locator("#colours")).to_have_accessible_name("Colours: dark. Switch to light")
+
+
+@pytest.mark.parametrize("viewport", [DESKTOP, PHONE], ids=["desktop", "phone"])
+@pytest.mark.parametrize("keys", ["Control+k", "/"])
+def test_keys_lead_to_the_search(
+    visit: Callable[..., Visit], front: Path, keys: str, viewport: dict[str, int]
+) -> None:
+    """On the front page, and on a page of the built site where there is one."""
+    built = BUILT / "docs" / "how-to" / "fit.html"
+    for page_file in (front, *([built] if built.exists() else [])):
+        page = visit("file://", viewport=viewport).page
+        page.goto(page_file.as_uri())
+        page.keyboard.press(keys)
+        field = page.locator("input[name=q]")
+        expect(field).to_be_focused()
+        expect(field).to_be_in_viewport()
+        expect(field).to_have_attribute("aria-keyshortcuts", "Control+K /")
+        page.keyboard.type("a/b")
+        expect(field).to_have_value("a/b")
 
 
 def test_four_doors_lead_to_pages_that_are_there(visit: Callable[..., Visit], front: Path) -> None:
@@ -115,6 +152,9 @@ def test_a_page_of_each_sort_of_the_built_site(visit: Callable[..., Visit], sche
     for place in SORTS:
         before = len(one.requests)
         one.page.goto((BUILT / place).as_uri())
+        assert version("driftwalk") in (one.page.locator(".sidebar-brand").text_content() or "")
+        crumbs = one.page.get_by_role("navigation", name="Breadcrumbs").get_by_role("link")
+        assert crumbs.count() >= (0 if place == SORTS[0] else 2), place
         loaded = {unquote(urlsplit(url).path) for url in one.requests[before:]}
         assert sum(Path(path).stat().st_size for path in loaded) < PAGE_BYTES, place
         for viewport in (DESKTOP, PHONE):

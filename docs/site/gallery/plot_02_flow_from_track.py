@@ -16,7 +16,7 @@ estimated = dw.extract_flow(recording, mass=0.0116, side=0.03)
 
 figure, axes = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained")
 for flow, ax, title in zip(
-    (estimated, dw.tank30_flow()), axes, ("from the track", "true"), strict=True
+    (estimated, dw.tank30_flow()), axes, ("(a) from the track", "(b) true"), strict=True
 ):
     dw.plot.flow(flow, ax, speed_limit=0.08)
-    ax.set_title(title)
+    ax.set_title(title, loc="left")

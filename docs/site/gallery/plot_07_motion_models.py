@@ -17,9 +17,13 @@ values = {
 }  # fmt: skip
 times = [0.05 * k for k in range(1200)]
 figure, axes = plt.subplots(1, 4, figsize=(13, 3.6), layout="constrained")
-for name, ax in zip(("active", "run_tumble", "run_rest", "active+wall+follow"), axes, strict=True):
+names = {
+    "active": "(a) active", "run_tumble": "(b) runs and tumbles", "run_rest": "(c) runs and rests",
+    "active+wall+follow": "(d) follows the wall",
+}  # fmt: skip
+for (name, title), ax in zip(names.items(), axes, strict=True):
     model = dw.motion_model(name)
     chosen = {one.name: values[one.name] for one in model.parameters}
     path = dw.simulate(model, parameters=chosen, study=dw.Study(), sample_time=times, seed=3)
     dw.plot.trajectory(path.isel(replicate=0), ax, colorbar="none")
-    ax.set_title(name)
+    ax.set_title(title, loc="left")

@@ -12,12 +12,12 @@ import driftwalk as dw
 
 tank = dw.LiveTank(dw.Study(), dw.tank30_flow(), blocks=6, seed=2)
 figure, axes = plt.subplots(1, 3, figsize=(11, 4), layout="constrained")
-for ax, (seconds, force_std) in zip(
-    axes, ((5.0, 0.2e-3), (60.0, 0.2e-3), (60.0, 1.5e-3)), strict=True
+for letter, ax, (seconds, force_std) in zip(
+    "abc", axes, ((5.0, 0.2e-3), (60.0, 0.2e-3), (60.0, 1.5e-3)), strict=True
 ):
     tank.set(force_std=force_std)
     tank.advance(seconds)
     ax.add_patch(plt.Circle((0, 0), 15, fill=False))
     ax.scatter(100 * tank.x, 100 * tank.y, marker="s", s=260)
     ax.set(xlim=(-16, 16), ylim=(-16, 16), aspect="equal", xlabel="x (cm)", ylabel="y (cm)")
-    ax.set_title(f"{tank.time:.0f} s, {tank.outcome}")
+    ax.set_title(f"({letter}) {tank.time:.0f} s", loc="left")

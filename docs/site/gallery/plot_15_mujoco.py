@@ -52,9 +52,9 @@ left.add_patch(plt.Circle((0, 0), radius, fill=False, color="0.5"))
 left.set(
     xlabel="x (cm)", ylabel="y (cm)", aspect="equal",
     xlim=(-1.04 * radius, 1.04 * radius), ylim=(-1.04 * radius, 1.04 * radius),
-    title="driftwalk (wide) and MuJoCo (black)",
+    title="(a) driftwalk (wide), MuJoCo (black)",
 )  # fmt: skip
 right.set(
     xlabel="time (s)", ylabel="distance (µm)", ylim=(0, None),
-    title="how far apart the two are",
+    title="(b) how far apart the two are",
 )  # fmt: skip

@@ -269,7 +269,7 @@ def _print_estimates(method: str, found: xr.Dataset) -> None:
                 for one in (shown[name].value, *(shown[name].ends or ()))
             )
             text = f"{value} ({' to '.join(ends)})" if ends else value
-        label = f"{number.words} [{number.reader_unit}]" if number.reader_unit else number.words
+        label = f"{number.words} ({number.reader_unit})" if number.reader_unit else number.words
         _print_row(label, f"{number.factor * truth[number.key]:.4g}", text)
 
 

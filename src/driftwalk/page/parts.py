@@ -221,10 +221,9 @@ def summary_section(
 def table_section(
     id: str, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]], note: str = ""
 ) -> Section:
-    """Return a table; cells that a row lacks at its end stay empty, units are as in figures."""
+    """Return a table; cells that a row lacks at its end stay empty."""
     filled = [[*row, *[""] * (len(columns) - len(row))] for row in rows]
-    heads = [one.replace("[", "(").replace("]", ")") for one in columns]
-    return section(id, "table", title, note or None, columns=heads, rows=filled)
+    return section(id, "table", title, note or None, columns=list(columns), rows=filled)
 
 
 def section_of_table(id: str, title: str, table: Table, note: str = "") -> Section:

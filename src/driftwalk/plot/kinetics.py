@@ -221,5 +221,8 @@ def plot_predicted_shares(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set(xlabel=TIME_LABEL, ylabel="share of runs", xlim=(time[0], time[-1]), ylim=(0.0, None))
     ax.legend(ncols=2)
     ax.spines[["top", "right"]].set_visible(False)
-    ax.set_title("predicted (lines), seen (points)", loc="left")
+    points = " and ".join(
+        f"{marker} {name}" for marker, name in zip("●×", kinetics["source"].values, strict=False)
+    )
+    ax.set_title(f"predicted (lines), seen ({points})", loc="left")
     return ax

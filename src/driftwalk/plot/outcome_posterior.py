@@ -9,6 +9,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import check_kind
+from driftwalk.plot.parts.labels import number_label, set_symbols
 from driftwalk.schema.answers.outcome_posterior import condition, number_of
 from driftwalk.schema.answers.parts import each
 
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from driftwalk.schema.description import Number
 
 BINS = 48
 """Bins of each axis of the joint posterior; chosen by hand."""
@@ -71,18 +71,11 @@ def plot_outcome_posterior(
     nodes = [n.factor * one["node_value"].values for n, one in zip(numbers, chosen, strict=True)]
     ax.plot(*nodes, ".", ms=1.5, color=style.MUTED)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    names = [_words(n) + (f" ({n.reader_unit})" if n.reader_unit else "") for n in numbers]
-    ax.set(xlabel=names[0], ylabel=names[1])
+    ax.set(xlabel=number_label(numbers[0]), ylabel=number_label(numbers[1]))
     used = f"{posterior.attrs['used']}: {100 * confidence:.0f} % and 50 % regions"
     words = [condition(posterior).replace(" (", "\n("), used, "dots: simulated settings"]
     ax.set_title("\n".join(filter(None, words)), loc="left")
     return ax
-
-
-def _words(number: Number) -> str:
-    """Return the name of a parameter with its symbol as other figures write it."""
-    symbol = f" ${number.symbol}$" if number.symbol else ""
-    return f"{number.label or number.name.replace('_', ' ')}{symbol}"
 
 
 def _smoothed(mass: Floats) -> Floats:
@@ -135,7 +128,7 @@ def plot_data_widths(posterior: xr.Dataset, ax: Axes | None = None) -> Axes:
     for at, one in enumerate(each(posterior, "parameter")):
         width = np.where(offered, one["expected_width"].values, np.nan)
         rows = place + 0.8 * ((at + 0.5) / size - 0.5)
-        ax.barh(rows, width, height=0.8 / size, label=_words(number_of(one)))
+        ax.barh(rows, width, height=0.8 / size, label=set_symbols(number_of(one).words))
     for row, there in enumerate(offered):
         if not there:
             ax.text(0.01, row, "not offered: regions do not cover", va="center")

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.plot.assembly_courses import TIME_LABEL
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import check_kind
-from driftwalk.schema.answers.yields import setting_words
+from driftwalk.plot.parts.labels import set_symbols
+from driftwalk.schema.answers.yields import point_words, varied
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -51,12 +53,14 @@ def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     time = found["time"].values
     ax.fill_between(
         time, found["front_yield_low"], found["front_yield_high"], color=style.MUTED, alpha=0.3,
-        lw=0, label="best of each time",
+        lw=0, label=f"best of each time, {100 * found.attrs['confidence']:.3g} % interval",
     )  # fmt: skip
     ahead = np.bincount(found["front_setting"].values, minlength=found.sizes["setting"])
     ahead[int(found.attrs["best"])] += time.size
-    for at in np.argsort(-ahead, kind="stable")[: int((ahead > 0).sum())]:
-        ax.plot(time, found["share"].values[at], label=setting_words(found, int(at)))
+    leading = np.argsort(-ahead, kind="stable")[: int((ahead > 0).sum())]
+    words, shared = _setting_labels(found, leading)
+    for at, label in zip(leading, words, strict=True):
+        ax.plot(time, found["share"].values[at], label=label)
     by = found.attrs["by_s"]
     ax.axvline(by, color=style.MUTED, lw=0.6, ls="--", label=f"deadline {by:g} s")
     target = short_class(str(found.attrs["target"]))
@@ -64,6 +68,7 @@ def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
         xlabel=TIME_LABEL, ylabel=f"share of runs with {target}", xlim=(time[0], time[-1]),
         ylim=(0.0, None),
     )  # fmt: skip
+    ax.set_title(shared, loc="left")
     ax.legend()
     ax.spines[["top", "right"]].set_visible(False)
     return ax
@@ -116,10 +121,11 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.axvspan(
         -within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"grey: within {100 * within:g} %"
     )
-    words = [setting_words(found, int(at)) for at in order]
+    words, shared = _setting_labels(found, order)
     ax.set_yticks(range(len(order)), words)
     ax.invert_yaxis()
-    ax.set_xlabel("yield less that of the best")
+    ax.locator_params(axis="x", nbins=5)
+    ax.set_xlabel("\n".join(filter(None, ["yield less that of the best", shared])))
     ax.spines[["top", "right"]].set_visible(False)
     handles, texts = ax.get_legend_handles_labels()
     keys = dict(zip(texts, handles, strict=True))
@@ -131,3 +137,13 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
         # Long labels are wider in the file than as the layout measures them.
         engine.set(w_pad=0.1)
     return ax
+
+
+def _setting_labels(found: xr.Dataset, shown: npt.NDArray[np.intp]) -> tuple[list[str], str]:
+    """Return what tells the shown settings apart, of each, and what they have in common."""
+    points = [{name: found[name].values[at] for name in varied(found)} for at in shown]
+    alike = [name for name in points[0] if all(one[name] == points[0][name] for one in points)]
+    several = [name for name in points[0] if name not in alike or len(points) == 1]
+    each = [{name: one[name] for name in several} for one in points]
+    shared = {name: points[0][name] for name in alike if name not in several}
+    return [set_symbols(point_words(one)) for one in each], set_symbols(point_words(shared))

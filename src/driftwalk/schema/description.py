@@ -123,9 +123,19 @@ class Number:
         return flat_name(self.name, self.unit)
 
     @property
+    def plain(self) -> str:
+        """The label: "drag coefficient"."""
+        return self.label or self.name.replace("_", " ")
+
+    @property
     def words(self) -> str:
         """Label and symbol: "drag coefficient C_d"."""
-        return f"{self.label or self.name.replace('_', ' ')} {self.symbol}".rstrip()
+        return f"{self.plain} {self.symbol}".rstrip()
+
+    @property
+    def short(self) -> str:
+        """The symbol, or the label where there is none."""
+        return self.symbol or self.plain
 
     @property
     def reader_unit(self) -> str:
@@ -141,7 +151,7 @@ class Number:
 _READER_UNITS: Final = MappingProxyType({"N": "mN", "m": "mm", "1": ""})
 """Units that suit a block of 3 cm."""
 _FACTORS: Final = MappingProxyType(
-    {"mN": 1e3, "mm": 1e3, "ms": 1e3, "g/s": 1e3, "%": 1e2, "°": math.degrees(1.0)}
+    {"mN": 1e3, "cm": 1e2, "mm": 1e3, "ms": 1e3, "g/s": 1e3, "%": 1e2, "°": math.degrees(1.0)}
 )
 
 

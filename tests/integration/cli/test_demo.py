@@ -82,8 +82,8 @@ def test_both_answers_stand_beside_the_truth(finished: tuple[Path, Done]) -> Non
         lines = lines[first + 1 :]
         rows = {line[:27].strip(): line[27:].split() for line in reversed(lines)}
         assert rows["drag coefficient C_d"][0] == "0.3948"
-        assert rows["stochastic force σ_F [mN]"][0] == "0.6123"
-        assert rows["tracking noise [mm]"][0] == "0.3"
+        assert rows["stochastic force σ_F (mN)"][0] == "0.6123"
+        assert rows["tracking noise (mm)"][0] == "0.3"
         assert rows["verdict"] == ["explains"]
     assert lines[-1] == f"open in a browser: {folder / 'report.html'}"
     page = page_in((folder / "report.html").read_text(encoding="utf-8"))

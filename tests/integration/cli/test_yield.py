@@ -59,7 +59,7 @@ def test_a_range_is_searched(tmp_path: Path) -> None:
     words = ("--vary", "force-std=0.2:1mN", "--target", "2+1", "--runs", "1600")
     done = here("yield", *SHORT, *words, "-o", tmp_path / "out")
     assert done.code == 0, done.err
-    assert re.search(r"best setting +force std \S+ mN", done.out)
+    assert re.search(r"best setting +σ_F = \S+ mN", done.out)
     found = xr.load_dataset(tmp_path / "out" / "yields.nc")
     assert found.attrs["searched"] == "force_std"
     assert np.all((found["force_std"] >= 2e-4) & (found["force_std"] <= 1e-3))
@@ -83,7 +83,7 @@ def test_a_stopped_run_is_continued(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     # Its page shows the settings that have runs.
     (shown,) = RunSource(tmp_path / "parts").greeting()
     assert "Settings so far" in json.dumps(shown)
-    assert "flow scale 0.5" in json.dumps(shown)
+    assert "strength of the flow 0.5" in json.dumps(shown)
     assert here(*words, "-o", tmp_path / "parts").code == 0
     one, two = (xr.load_dataset(tmp_path / name / "yields.nc") for name in ("whole", "parts"))
     assert one.identical(two)

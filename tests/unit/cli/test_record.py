@@ -39,7 +39,7 @@ def test_info_as_a_table(recording: Path, capsys: pytest.CaptureFixture[str]) ->
     captured = capsys.readouterr()
     lines = {line[:32].strip(): line for line in captured.out.splitlines()}
     assert lines["samples left"].split()[-1] == "100"
-    assert lines["rate [Hz]"].split()[-1] == "10"
+    assert lines["rate (Hz)"].split()[-1] == "10"
     assert "down in the file" in captured.out
     assert "never reaches the rim" in captured.err
 

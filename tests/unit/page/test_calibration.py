@@ -246,7 +246,7 @@ def test_halves_are_shown_where_they_are(calibration: xr.Dataset) -> None:
     }
     made = calibration_sections(answered(calibration, halves))
     rows = dict(part_of(made, "validation")["rows"])
-    assert rows["σ_F [mN], first half"] == pytest.approx(0.6)
+    assert rows["σ_F (mN), first half"] == pytest.approx(0.6)
     assert rows["KS distance to the second half"] == 0.05
     assert "0.05 from the second" in " ".join(part_of(made, "summary")["paragraphs"])
 

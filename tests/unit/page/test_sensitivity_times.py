@@ -76,7 +76,7 @@ def test_rare_classes_are_summed_with_what_is_summed_already() -> None:
 @pytest.mark.parametrize(
     ("axis", "along", "names"),
     [
-        ("blocks", [3, 4, 5], ["blocks 3", "blocks 4", "blocks 5"]),
+        ("blocks", [3, 4, 5], ["number of blocks 3", "number of blocks 4", "number of blocks 5"]),
         ("tank_diameter", [0.25, 0.3], ["tank diameter 25 cm", "tank diameter 30 cm"]),
         ("latching", ["collision", "none"], ["latching collision", "latching none"]),
     ],
@@ -124,7 +124,7 @@ def test_of_more_than_twelve_parts_the_first_are_shown_and_the_rest_named() -> N
     assert part_of(made, "l1-12")["note"] == "More are in the file."
     times = [part for part in made if part["kind"] == "setting_times"]
     assert len(times) == 12
-    assert times[2]["title"] == "Outcome classes over time, blocks 5"
+    assert times[2]["title"] == "Outcome classes over time, number of blocks 5"
 
 
 def test_maps_without_end_have_fewer_times(

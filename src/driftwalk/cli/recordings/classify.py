@@ -248,7 +248,7 @@ def _rate_table(summary: dict[str, Any]) -> None:
             low, high = one["interval_per_s"]
             cells += [one["count"], f"{one['per_s']:.3g}", f"{low:.3g} to {high:.3g}"]
         rows.append(cells)
-    heads = (["joinings", "[1/s]", interval], ["partings", "[1/s]", interval])
+    heads = (["joinings", "(1/s)", interval], ["partings", "(1/s)", interval])
     print_table(rows, columns=["class", *heads[0], *heads[1]])
     print()
     if (rate := summary.get("bond_rate_per_s")) is not None:
@@ -287,7 +287,7 @@ def _print(summary: dict[str, Any]) -> None:
         [short_class(name), 100.0 * share, share * known]
         for name, share in summary["proportions"].items()
     ]
-    print_table(rows, columns=["class", "share of time [%]", "time [s]"])
+    print_table(rows, columns=["class", "share of time (%)", "time (s)"])
     print()
     listed = [
         [
@@ -299,7 +299,7 @@ def _print(summary: dict[str, Any]) -> None:
         for event in summary["events"]
     ]
     if listed:
-        columns = ["time [s]", "event", "block:face", "block:face", "class afterwards"]
+        columns = ["time (s)", "event", "block:face", "block:face", "class afterwards"]
         print_table(listed, columns=columns)
     else:
         print("no blocks joined")

@@ -19,39 +19,39 @@ MOST_UNREAD = 12
 _ROWS: list[tuple[str, str, float]] = [
     ("samples", "samples", 1),
     ("orientation", "has_orientation", 1),
-    ("duration [s]", "duration_s", 1),
-    ("from [s]", "start_s", 1),
-    ("to [s]", "stop_s", 1),
-    ("rate [Hz]", "rate_Hz", 1),
-    ("interval, 5 % [ms]", "interval_5_percent_s", 1e3),
-    ("interval, median [ms]", "interval_median_s", 1e3),
-    ("interval, 95 % [ms]", "interval_95_percent_s", 1e3),
-    ("uneven intervals [%]", "uneven_intervals_share", 100),
+    ("duration (s)", "duration_s", 1),
+    ("from (s)", "start_s", 1),
+    ("to (s)", "stop_s", 1),
+    ("rate (Hz)", "rate_Hz", 1),
+    ("interval, 5 % (ms)", "interval_5_percent_s", 1e3),
+    ("interval, median (ms)", "interval_median_s", 1e3),
+    ("interval, 95 % (ms)", "interval_95_percent_s", 1e3),
+    ("uneven intervals (%)", "uneven_intervals_share", 100),
     ("gaps", "gaps", 1),
-    ("longest gap [s]", "longest_gap_s", 1),
-    ("time in gaps [%]", "gap_time_share", 100),
-    ("x from [cm]", "x_min_m", 100),
-    ("x to [cm]", "x_max_m", 100),
-    ("y from [cm]", "y_min_m", 100),
-    ("y to [cm]", "y_max_m", 100),
-    ("speed, mean [cm/s]", "speed_mean_m_s", 100),
-    ("speed, 99 % [cm/s]", "speed_99_percent_m_s", 100),
-    ("speed, largest [cm/s]", "speed_max_m_s", 100),
+    ("longest gap (s)", "longest_gap_s", 1),
+    ("time in gaps (%)", "gap_time_share", 100),
+    ("x from (cm)", "x_min_m", 100),
+    ("x to (cm)", "x_max_m", 100),
+    ("y from (cm)", "y_min_m", 100),
+    ("y to (cm)", "y_max_m", 100),
+    ("speed, mean (cm/s)", "speed_mean_m_s", 100),
+    ("speed, 99 % (cm/s)", "speed_99_percent_m_s", 100),
+    ("speed, largest (cm/s)", "speed_max_m_s", 100),
     ("turn rate, mean [rad/s]", "turn_rate_mean_rad_s", 1),
-    ("position noise [mm]", "position_noise_m", 1e3),
-    ("  standard error [mm]", "position_noise_standard_error_m", 1e3),
+    ("position noise (mm)", "position_noise_m", 1e3),
+    ("  standard error (mm)", "position_noise_standard_error_m", 1e3),
     ("orientation noise [deg]", "orientation_noise_rad", 57.29577951308232),
     ("  standard error [deg]", "orientation_noise_standard_error_rad", 57.29577951308232),
-    ("identity ambiguous [%]", "ambiguous_share", 100),
+    ("identity ambiguous (%)", "ambiguous_share", 100),
 ]
 _CIRCLE_ROWS: list[tuple[str, str, float]] = [
-    ("circle of centres: radius [cm]", "radius_m", 100),
-    ("  rim visited [%]", "sectors_visited_share", 100),
+    ("circle of centres: radius (cm)", "radius_m", 100),
+    ("  rim visited (%)", "sectors_visited_share", 100),
 ]
 _OF_A_RECORDING: list[tuple[str, str, float]] = [
     ("tracks", "tracks_used", 1),
     ("samples", "samples_used", 1),
-    ("standard error, median [cm/s]", "standard_error_median_m_s", 100),
+    ("standard error, median (cm/s)", "standard_error_median_m_s", 100),
 ]
 """Rows of a flow field that was taken from a recording."""
 _TRACKED = ["ambiguous_share"]
@@ -151,13 +151,13 @@ def _print_field(described: dict[str, Any], *, json: bool) -> None:
             ["flow field", f"{described['columns']} x {described['rows']} nodes"],
             ["frames", described["frames"]],
             *(
-                [f"{axis} {word} [cm]", 100 * described[f"{axis}_{side}_m"]]
+                [f"{axis} {word} (cm)", 100 * described[f"{axis}_{side}_m"]]
                 for axis in ("x", "y")
                 for word, side in (("from", "min"), ("to", "max"))
             ),
-            ["measured nodes [%]", 100 * described["measured_share"]],
-            ["speed, mean [cm/s]", 100 * described["speed_mean_m_s"]],
-            ["speed, largest [cm/s]", 100 * described["speed_max_m_s"]],
+            ["measured nodes (%)", 100 * described["measured_share"]],
+            ["speed, mean (cm/s)", 100 * described["speed_mean_m_s"]],
+            ["speed, largest (cm/s)", 100 * described["speed_max_m_s"]],
             *(
                 [label, factor * described[key]]
                 for label, key, factor in _OF_A_RECORDING
@@ -175,7 +175,7 @@ def _print_file(described: dict[str, Any]) -> None:
         ["y axis", described["y_axis"]],
         ["bodies", len(described["bodies"])],
         ["arena", _arena_text(described)],
-        ["resolution [mm]", _scaled(described["position_quantum_m"] or None, 1e3)],
+        ["resolution (mm)", _scaled(described["position_quantum_m"] or None, 1e3)],
     ]
     if described["time_origin"] is not None:
         rows.append(["t = 0 is", described["time_origin"]])

@@ -55,8 +55,8 @@ def teach(
         raise
     marker = proposal.marker
     rows: list[list[Any]] = [
-        ["distance of the discs [mm]", 1e3 * marker.spacing_m],
-        ["diameter of a disc [mm]", 1e3 * marker.size_m],
+        ["distance of the discs (mm)", 1e3 * marker.spacing_m],
+        ["diameter of a disc (mm)", 1e3 * marker.size_m],
         ["pairs measured", proposal.pairs],
         *[["colour seen", str(seen)] for seen in proposal.colours],
     ]

@@ -93,7 +93,7 @@ def _print(found: dict[str, Any]) -> None:
         [name, 100.0 * body["seen_share"], 100.0 * body["ambiguous_share"]]
         for name, body in found["bodies"].items()
     ]
-    print_table(rows, columns=["body", "seen [%]", "ambiguous [%]"])
+    print_table(rows, columns=["body", "seen (%)", "ambiguous (%)"])
     print()
     counts = {**found["counts"], **found["counts"]["rejected"]}
     counts.pop("rejected")
@@ -132,7 +132,7 @@ def _explain(options: TrackingOptions, number: int, out: Path | None, existing: 
     save_picture(picture, explain_frame(frame.image, found, rejected, camera=parts.camera))
     rows = [[one.column, one.row, "found" + (f" {one.key}" if one.key else "")] for one in found]
     rows += [[one.column, one.row, one.reason] for one in rejected]
-    print_table(rows, columns=["column [px]", "row [px]", "result"])
+    print_table(rows, columns=["column (px)", "row (px)", "result"])
     print_note(f"wrote {picture}")
 
 

@@ -76,9 +76,9 @@ def print_table(
 
     Examples
     --------
-    >>> print_table([["samples", 18001], ["duration [s]", 1800.0]])
+    >>> print_table([["samples", 18001], ["duration (s)", 1800.0]])
     samples       18001
-    duration [s]  1800
+    duration (s)  1800
     """
     from driftwalk.schema.answers.parts import table_lines
 

@@ -30,10 +30,10 @@ from driftwalk.page.sections.outcomes import (
     size_sections,
 )
 from driftwalk.page.sections.replay import replay_section
-from driftwalk.page.sections.sensitivity_maps import axis_words
 from driftwalk.page.sections.steady_state import steady_sections
 from driftwalk.plot.parts.assembly_labels import class_names
 from driftwalk.schema.answers.assembly import attraction_words
+from driftwalk.schema.kinds.sensitivity import axis_number
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -231,7 +231,7 @@ def _parameters(distribution: xr.Dataset, assembly: xr.Dataset | None) -> str:
 def _beside(distribution: xr.Dataset, drawn: xr.Dataset, *, classes: bool) -> str:
     """Return how far the runs with drawn parameters are from the others."""
     require(drawn, "class", "proportion")
-    words = [axis_words(name) for name in str(drawn.attrs.get("drawn", "")).split()]
+    words = [axis_number(name).plain for name in str(drawn.attrs.get("drawn", "")).split()]
     what = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
     said = (
         f"In a second set each run has its own {what or 'parameters'}, drawn from the "
@@ -285,7 +285,7 @@ def _median(times: xr.Dataset, name: str) -> dict[str, Any]:
     known = value_of(times, f"{name}_median_s") is not None
     note = None if known else "not reached in half the runs"
     return figure_with_ends(
-        times, f"{name}_median", f"{axis_words(name)}, median", "s", suffix="_s", note=note
+        times, f"{name}_median", f"{axis_number(name).plain}, median", "s", suffix="_s", note=note
     )
 
 

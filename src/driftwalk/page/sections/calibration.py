@@ -220,7 +220,7 @@ def validation_section(calibration: xr.Dataset) -> Section:
 
 def _with_unit(one: PageParameter) -> str:
     unit = "mN" if one == FORCE else one.unit
-    return one.short_symbol if unit == "1" else f"{one.short_symbol} [{unit}]"
+    return one.short_symbol if unit == "1" else f"{one.short_symbol} ({unit})"
 
 
 def _what_was_done(calibration: xr.Dataset) -> str:

@@ -188,4 +188,4 @@ def film_section(test: xr.Dataset) -> Section:
             continue
         mode = "" if modes[at] < 0 else str(test["mode"].values[modes[at]])
         rows.append([f"{time:g}", short_class(str(test["class"].values[classes[at]])), mode])
-    return table_section("film", "One run", ["time [s]", "class", "mode from then on"], rows)
+    return table_section("film", "One run", ["time (s)", "class", "mode from then on"], rows)

@@ -83,7 +83,7 @@ def posterior_summary(posterior: xr.Dataset) -> Section:
         ends = tuple(one["interval"].values.tolist()) if known else (None, None)
         shown.append(
             figure(
-                number.label or number.name.replace("_", " "),
+                number.plain,
                 float(one["estimate"]) if known else None,
                 number.unit,
                 symbol=number.symbol,
@@ -107,7 +107,7 @@ def density_sections(posterior: xr.Dataset) -> list[Section]:
             one["value"].values, BINS, range=ends, weights=weight, density=True
         )
         flat = np.full(BINS, 1.0 / (ends[1] - ends[0]))
-        name = number.label or number.name.replace("_", " ")
+        name = number.plain
         drawn = [
             series("posterior", edges, density * (ends[1] - ends[0]), style="step"),
             series("without data", edges, flat * (ends[1] - ends[0]), style="step"),

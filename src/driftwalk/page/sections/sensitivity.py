@@ -25,7 +25,6 @@ from driftwalk.page.parts import (
 )
 from driftwalk.page.sections.outcomes import cells_of, classes_section
 from driftwalk.page.sections.sensitivity_maps import (
-    axis_words,
     l1_sections,
     require_axes,
     setting_sections,
@@ -34,6 +33,7 @@ from driftwalk.page.sections.sensitivity_maps import (
 )
 from driftwalk.plot.components import biplot_of
 from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.schema.kinds.sensitivity import axis_number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,7 +106,7 @@ def sensitivity_summary(sensitivity: xr.Dataset, reference: xr.Dataset | None) -
     """Return the sensitivity in words and numbers."""
     require(sensitivity, "l1_distance", "runs")
     distance = sensitivity["l1_distance"]
-    names = " and ".join(axis_words(str(dim)) for dim in distance.dims)
+    names = " and ".join(axis_number(str(dim)).plain for dim in distance.dims)
     runs = int(np.nanmax(sensitivity["runs"].values))
     done = (
         f"Self-assembly was simulated at {count(int(distance.size), 'setting')} of the {names}, "
@@ -166,7 +166,10 @@ def biplot_section(components: xr.Dataset, sensitivity: xr.Dataset) -> Section:
         if name in sensitivity and set(map(str, sensitivity[name].dims)) == set(dims)
     }
     settings = settings_of(
-        *([f"{axis_words(n)} {value_words(n, v)}" for v in sensitivity[n].values] for n in dims)
+        *(
+            [f"{axis_number(n).plain} {value_words(n, v)}" for v in sensitivity[n].values]
+            for n in dims
+        )
     )
     return section(
         "biplot", "biplot", "Principal components",
@@ -193,7 +196,7 @@ def biplot_section(components: xr.Dataset, sensitivity: xr.Dataset) -> Section:
 def sobol_section(sobol: xr.Dataset) -> Section:
     """Return the Sobol' indices of the share of complete runs and of the largest classes."""
     require(sobol, "first_order", "total_order", "output", "input")
-    inputs = [axis_words(str(name)) for name in sobol["input"].values]
+    inputs = [axis_number(str(name)).plain for name in sobol["input"].values]
     variance = sobol["variance"].values if "variance" in sobol else np.ones(sobol.sizes["output"])
     # Next to the share of complete runs, the 12 classes that vary most.
     order = [0, *(1 + np.argsort(-variance[1:], kind="stable")[:12])]

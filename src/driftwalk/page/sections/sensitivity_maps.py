@@ -26,20 +26,11 @@ from driftwalk.page.parts import (
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
 from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.schema.kinds.sensitivity import AXIS_NUMBERS, axis_number
 
 if TYPE_CHECKING:
     import xarray as xr
 
-AXES: Final = {
-    "drag_coefficient": ("drag coefficient C_d", "1", ""),
-    "force_std": ("stochastic force σ_F", "N", "_N"),
-    "tank_diameter": ("tank diameter", "m", "_m"),
-    "blocks": ("number of blocks", "1", ""),
-    "flow_scale": ("strength of the flow", "1", ""),
-    "stirring_length": ("length of the stirring", "m", "_m"),
-    "bond_rate": ("rate at which bonds break", "1/s", "_per_s"),
-}
-"""Label, unit, and what an attribute's name has more, in the order from x to y."""
 MAP_AXES: Final = 2
 NOT_REACHED: Final = "Blank if fewer than half of the runs reached it."
 MOST_SLICES: Final = 12
@@ -67,7 +58,7 @@ def ranked_axes(names: Sequence[str]) -> list[str]:
     >>> ranked_axes(["latching", "force_std", "drag_coefficient"])
     ['drag_coefficient', 'force_std', 'latching']
     """
-    order = [*AXES]
+    order = [*AXIS_NUMBERS]
     return sorted(names, key=lambda name: order.index(name) if name in order else len(order))
 
 
@@ -78,23 +69,18 @@ def is_words(part: xr.Dataset, name: str) -> bool:
 
 def axis_of(part: xr.Dataset, name: str) -> dict[str, Any]:
     """Return an axis as maps have it, with its label, unit and values."""
-    words, unit, _ = AXES.get(name, (axis_words(name), "1", ""))
+    number, words = axis_number(name), axis_number(name).words
     every = value_of(part, "force_interval_s")
     if name == "force_std" and every is not None:
         words += f", redrawn every {quantity(every, 's')}"
-    return axis(name, words, unit, part[name].values)
-
-
-def axis_words(name: str) -> str:
-    """Return the name of an axis as it stands in a sentence."""
-    return "stochastic force" if name == "force_std" else name.replace("_", " ")
+    return axis(name, words, number.unit, part[name].values)
 
 
 def value_words(name: str, value: Any) -> str:
     """Return a value of an axis with its unit, as it stands in a sentence."""
     if isinstance(value, str):
         return value.replace("_", " ")
-    return quantity(float(value), AXES.get(name, ("", "1", ""))[1])
+    return quantity(float(value), axis_number(name).unit)
 
 
 def l1_sections(sensitivity: xr.Dataset) -> list[Section]:
@@ -225,15 +211,20 @@ def _lines(
         for value in part[y].values:
             one = part[variable].sel({y: value}).values
             drawn.append(
-                series(f"{axis_words(y)} {value_words(y, value)}", positions, one, style="points")
+                series(
+                    f"{axis_number(y).plain} {value_words(y, value)}",
+                    positions,
+                    one,
+                    style="points",
+                )
             )
     marks = []
     floor = value_of(part, "noise_floor_95")
     if noise and floor is not None:
         marks.append(mark("by chance, 95 %", y=floor))
-    words_x = AXES.get(x, (axis_words(x), "1", ""))
+    across = axis_number(x)
     return chart(
-        id, title, note or None, x=label(words_x[0], words_x[1]), y=label(words, unit),
+        id, title, note or None, x=label(across.words, across.unit), y=label(words, unit),
         series=drawn, marks=marks,
     )  # fmt: skip
 
@@ -244,7 +235,7 @@ def _positions(part: xr.Dataset, name: str) -> tuple[Floats, str]:
         return np.asarray(part[name].values, dtype=np.float64), ""
     values = [str(value) for value in part[name].values]
     told = ", ".join(f"{k}: {value}" for k, value in enumerate(values, start=1))
-    return np.arange(1.0, len(values) + 1.0), f"{axis_words(name)}: {told}.".capitalize()
+    return np.arange(1.0, len(values) + 1.0), f"{axis_number(name).plain}: {told}.".capitalize()
 
 
 def _slices(sensitivity: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
@@ -254,13 +245,13 @@ def _slices(sensitivity: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     parts = []
     for values in settings_of(*(sensitivity[name].values.tolist() for name in fixed)):
         chosen = dict(zip(fixed, values, strict=True))
-        words = "".join(f", {axis_words(n)} {value_words(n, v)}" for n, v in chosen.items())
+        words = "".join(f", {axis_number(n).plain} {value_words(n, v)}" for n, v in chosen.items())
         parts.append((words, sensitivity.sel(chosen)))
     return parts
 
 
 def _reference(part: xr.Dataset, name: str) -> float | None:
-    return value_of(part, f"reference_{name}{AXES.get(name, ('', '', ''))[2]}")
+    return value_of(part, f"reference_{axis_number(name).key}")
 
 
 def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any]:
@@ -314,7 +305,9 @@ def setting_times_section(part: xr.Dataset, id: str, where: str) -> Section:
     row = row.assign({name: row[name].expand_dims("y") for name in ("count_over_time", "runs")})
     found = over_time_part(row, "x", "y")
     settings = [
-        ", ".join(f"{axis_words(n)} {value_words(n, v)}" for n, v in zip(dims, place, strict=True))
+        ", ".join(
+            f"{axis_number(n).plain} {value_words(n, v)}" for n, v in zip(dims, place, strict=True)
+        )
         for place in settings_of(*(part[name].values.tolist() for name in dims))
     ]
     return section(id, "setting_times", title, None, settings=settings, over_time=found)

@@ -26,10 +26,10 @@ from driftwalk.schema.answers.yields import (
     setting_table,
     setting_words,
     standing_sentences,
-    value_text,
     varied,
     yield_answer,
 )
+from driftwalk.schema.kinds.sensitivity import axis_number
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -119,20 +119,17 @@ def along_sections(yields: xr.Dataset) -> list[Section]:
         values = yields[name].values
         if values.dtype == object or len(set(values.tolist())) < 2:
             continue
-        unit = value_text(name, values[0]).partition(" ")[2]
-        shown = [float(value_text(name, value).partition(" ")[0]) for value in values]
         drawn = []
         for word in ("worse", "alike", "best"):
             mine = yields["standing"].values == word
             if mine.any():
                 text = "cannot be distinguished" if word == "alike" else word
-                at = np.array(shown)[mine]
-                drawn.append(series(text, at, share[mine], style="points"))
-        words = name.replace("_", " ")
+                drawn.append(series(text, values[mine], share[mine], style="points"))
+        number = axis_number(name)
         found.append(
             chart(
-                f"along-{name}", f"Yield along {words}", "In the choosing runs.",
-                x=label(f"{words} ({unit})" if unit else words), y=label("yield"), series=drawn,
+                f"along-{name}", f"Yield along {number.plain}", "In the choosing runs.",
+                x=label(number.words, number.unit), y=label("yield"), series=drawn,
             )
         )  # fmt: skip
     return found

@@ -9,9 +9,10 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.plot.parts.labels import DRAG_LABEL, force_label, in_unit
+from driftwalk.plot.parts.labels import force_label, in_unit, number_label
 from driftwalk.plot.parts.style import PALETTE
 from driftwalk.schema.check import kind_name
+from driftwalk.schema.kinds.sensitivity import AXIS_NUMBERS, axis_number
 from driftwalk.schema.shapes import is_one_assembly
 
 if TYPE_CHECKING:
@@ -33,26 +34,6 @@ class SweepAxis(NamedTuple):
     """Places along the axis, in the unit of the label; 0, 1, ... for words."""
     words: list[str]
     """The words of a categorical axis; empty for numbers."""
-
-
-# dimension -> label, unit in the figure, unit in the dataset
-_NUMBERS: Final[dict[str, tuple[str, str, str]]] = {
-    "drag_coefficient": (DRAG_LABEL, "", ""),
-    "force_std": (r"stochastic force $\sigma_F$ (mN)", "mN", "N"),
-    "tank_diameter": ("tank diameter (cm)", "cm", "m"),
-    "blocks": ("number of blocks", "", ""),
-    "flow_scale": ("strength of the flow", "", ""),
-    "stirring_length": ("stirring length (cm)", "cm", "m"),
-    "bond_rate": ("rate at which bonds break (1/s)", "", ""),
-}
-_WORDS: Final[dict[str, str]] = {
-    "flow": "flow",
-    "glued": "glued at the start",
-    "latching": "latching",
-    "faces": "faces",
-    "hidden_face_drag": "drag on hidden faces",
-    "magnets": "magnets",
-}
 
 
 def check_kind(dataset: xr.Dataset, kind: str, *variables: str) -> None:
@@ -154,22 +135,21 @@ def sweep_axes(variable: xr.DataArray, dataset: xr.Dataset) -> list[SweepAxis]:
         The study, for its coordinates and the interval of the force.
     """
     names = [str(dim) for dim in variable.dims if dim not in ("class", "component")]
-    order = [*_NUMBERS, *_WORDS]
+    order = [*AXIS_NUMBERS]
     known = sorted((name for name in names if name in order), key=order.index)
     return [_sweep_axis(name, dataset) for name in [*known, *(n for n in names if n not in order)]]
 
 
 def reference_value(dataset: xr.Dataset, axis: SweepAxis) -> float:
     """Return where the reference lies on an axis, NaN when the dataset does not say."""
-    for suffix, factor in (("", 1.0), ("_N", 1e3), ("_m", 1e2)):
-        found = dataset.attrs.get(f"reference_{axis.name}{suffix}")
-        if found is None:
-            continue
-        if axis.words:
-            word = _word(found)
-            return float(axis.words.index(word)) if word in axis.words else np.nan
-        return factor * float(found)
-    return np.nan
+    number = axis_number(axis.name)
+    found = dataset.attrs.get(f"reference_{number.key}")
+    if found is None:
+        return np.nan
+    if axis.words:
+        word = _word(found)
+        return float(axis.words.index(word)) if word in axis.words else np.nan
+    return number.factor * float(found)
 
 
 def runs_text(dataset: xr.Dataset) -> str:
@@ -198,14 +178,14 @@ def _word(value: Any) -> str:
 
 
 def _sweep_axis(name: str, dataset: xr.Dataset) -> SweepAxis:
-    coordinate = dataset[name]
+    coordinate, number = dataset[name], axis_number(name)
     if coordinate.dtype.kind not in "iuf":
         words = [_word(value) for value in coordinate.values]
-        label = _WORDS.get(name, name.replace("_", " "))
-        return SweepAxis(name, label, np.arange(len(words), dtype=np.float64), words)
-    label, unit, stored = _NUMBERS.get(name, (name.replace("_", " "), "", ""))
+        return SweepAxis(name, number.plain, np.arange(len(words), dtype=np.float64), words)
+    label = number_label(number)
     if name == "force_std" and "force_interval_s" in dataset.attrs:
         label = force_label(dataset)
-    if unit:
-        return SweepAxis(name, label, in_unit(coordinate, unit, stored=stored), [])
+    if number.factor != 1.0:
+        values = in_unit(coordinate, number.reader_unit, stored=number.unit)
+        return SweepAxis(name, label, values, [])
     return SweepAxis(name, label, np.asarray(coordinate.values, dtype=np.float64), [])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema.answers.facts import facts_of
+from driftwalk.schema.description import Number
 from driftwalk.schema.parameters import StoredParameter, is_block, stored_parameters
 
 if TYPE_CHECKING:
@@ -68,6 +70,23 @@ DRAG_LABEL = r"drag coefficient $C_d$"
 LENGTH_LABEL = "step length (mm)"
 # The paper says step angle for what the field calls turning angle.
 ANGLE_LABEL = "turning (step) angle (°)"
+
+
+def set_symbols(text: str) -> str:
+    """Return a text whose symbols are set as mathematics.
+
+    Examples
+    --------
+    >>> set_symbols("C_d = 0.4, run_rest")
+    '$C_d$ = 0.4, run_rest'
+    """
+    return re.sub(r"(?<!\w)([^\W\d_]_[^\W\d_])(?!\w)", r"$\1$", text)
+
+
+def number_label(number: Number) -> str:
+    """Return the label of an axis: words, symbol, and the unit in round brackets."""
+    unit = f" ({number.reader_unit})" if number.reader_unit else ""
+    return f"{set_symbols(number.words)}{unit}"
 
 
 def required_fact(dataset: xr.Dataset, name: str) -> Any:

@@ -254,7 +254,7 @@ def _sizes(distribution: xr.Dataset, sizes: xr.Dataset, what: str) -> list[Part]
         for one in chosen
     ]
     over_time = [head for words in known.values() for head in (words, interval)]
-    parts: list[Part] = [Table(rows, heads, what), Table(course, ["time [s]", *over_time])]
+    parts: list[Part] = [Table(rows, heads, what), Table(course, ["time (s)", *over_time])]
     if facts["compactness_runs"]:
         ends = _range(facts["compactness_low"], facts["compactness_high"])
         within = f" ({interval} {ends})" if ends else ""

@@ -84,7 +84,7 @@ def rate_table(found: xr.Dataset, source: int) -> Table:
         for one in each(found.isel(source=source), "transition")
     ]
     name = "" if found.sizes["source"] == 1 else f"{found['source'].values[source]} data set"
-    return Table(rows, ["transition", "seen", "rate [1/s]", share], name)
+    return Table(rows, ["transition", "seen", "rate (1/s)", share], name)
 
 
 def choice_words(found: xr.Dataset) -> str:
@@ -138,7 +138,7 @@ def target_table(found: xr.Dataset) -> Table:
         if str(one["class"].values) in left - {str(found.attrs["target"])}
     ]
     target = short_class(str(found.attrs["target"]))
-    return Table(rows, ["from", f"reaches {target}", "mean first-passage time [s]"])
+    return Table(rows, ["from", f"reaches {target}", "mean first-passage time (s)"])
 
 
 def equal_table(found: xr.Dataset) -> Table:

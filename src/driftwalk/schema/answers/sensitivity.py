@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each
+from driftwalk.schema.kinds.sensitivity import axis_number
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
 
-UNITS: Final = {"force_std": "_N", "tank_diameter": "_m"}
 """Suffixes that turn names of axes into keys of JSON."""
 LISTED_COMPONENTS: Final = 3
 _REFERENCE: Final = (
@@ -102,7 +102,7 @@ def key_of(axis: str) -> str:
     >>> key_of("force_std"), key_of("blocks")
     ('force_std_N', 'blocks')
     """
-    return f"{axis}{UNITS.get(axis, '')}"
+    return axis_number(axis).key
 
 
 def _l1(found: xr.Dataset) -> dict[str, Any]:

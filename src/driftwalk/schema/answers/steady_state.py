@@ -17,9 +17,9 @@ MOST_ROWS: Final = 16
 """Classes in the table, those with the most time."""
 COLUMNS: Final = {
     "time_share": ("share of time", ""),
-    "lifetime_median": ("median lifetime [s]", "_s"),
-    "joining_rate": ("joinings [1/s]", "_per_s"),
-    "parting_rate": ("partings [1/s]", "_per_s"),
+    "lifetime_median": ("median lifetime (s)", "_s"),
+    "joining_rate": ("joinings (1/s)", "_per_s"),
+    "parting_rate": ("partings (1/s)", "_per_s"),
 }
 """Variables with intervals: head of the column, and what a key of JSON has more."""
 

@@ -10,15 +10,13 @@ import numpy as np
 
 from driftwalk.schema.answers.parts import Answer, Part, Row, Table
 from driftwalk.schema.answers.sensitivity import key_of
-from driftwalk.schema.kinds.sensitivity import AXES
+from driftwalk.schema.kinds.sensitivity import AXES, axis_number
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
 
 NAMES: Final = tuple(one.name for one in AXES)
-SHOWN: Final = {"force_std": (1e3, " mN"), "tank_diameter": (1e2, " cm"), "bond_rate": (1.0, " /s")}
-"""Factor and unit in which a reader sees the values of an axis."""
 LISTED: Final = 12
 """Settings of a table; a search has more."""
 NAMED: Final = 4
@@ -72,19 +70,27 @@ def value_text(name: str, value: Any) -> str:
     """
     if isinstance(value, str):
         return value
-    factor, unit = SHOWN.get(name, (1.0, ""))
-    return f"{factor * float(value):.4g}{unit}"
+    number = axis_number(name)
+    return f"{number.factor * float(value):.4g} {number.reader_unit}".rstrip()
 
 
 def setting_words(found: xr.Dataset, at: int) -> str:
-    """Return the values of a setting, as in "flow scale 1.5, force std 1.2 mN"."""
+    """Return the values of a setting, see `point_words`."""
     return point_words({name: found[name].values[at] for name in varied(found)})
 
 
 def point_words(point: Mapping[str, Any]) -> str:
-    """Return the values of a setting by the names of their axes, in words."""
+    """Return the values of a setting by what a reader calls them.
+
+    Examples
+    --------
+    >>> point_words({"flow_scale": 1.5, "force_std": 0.0012})
+    'strength of the flow 1.5, σ_F = 1.2 mN'
+    """
+    numbers = {name: axis_number(name) for name in point}
     return ", ".join(
-        f"{name.replace('_', ' ')} {value_text(name, value)}" for name, value in point.items()
+        f"{one.short}{' =' if one.symbol else ''} {value_text(name, point[name])}"
+        for name, one in numbers.items()
     )
 
 
@@ -111,7 +117,7 @@ def standing_sentences(found: xr.Dataset) -> list[str]:
     said = [first + named + more]
     kept = found.isel(setting=[int(facts["best"]), *alike])
     spans = [
-        f"{name.replace('_', ' ')} {value_text(name, kept[name].min())} to "
+        f"{axis_number(name).short} {value_text(name, kept[name].min())} to "
         f"{value_text(name, kept[name].max())}"
         for name in str(facts["searched"]).split(", ")
         if name
@@ -188,7 +194,7 @@ def front_table(found: xr.Dataset) -> Table:
         for at in tenths
     ]
     share_words = f"{found.attrs['confidence']:.0%} interval"
-    return Table(rows, ["time [s]", "yield", share_words, "setting"], "front of yield and time")
+    return Table(rows, ["time (s)", "yield", share_words, "setting"], "front of yield and time")
 
 
 def _facts(found: xr.Dataset) -> dict[str, Any]:

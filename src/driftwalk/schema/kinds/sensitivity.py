@@ -7,6 +7,7 @@ from typing import Final
 
 from driftwalk.schema.description import (
     SOURCE_WARNINGS,
+    Number,
     Variable,
     attributes,
     kind,
@@ -14,6 +15,7 @@ from driftwalk.schema.description import (
     variables,
 )
 from driftwalk.schema.kinds.assembly import SETTINGS
+from driftwalk.schema.kinds.fit import BLOCK_NUMBERS
 
 AXES: Final = variables("""
 variables (an axis):
@@ -33,6 +35,31 @@ variables (an axis):
     magnets(magnets) text: magnet at the centre of each face
 """)
 """Quantities that may vary over a map."""
+AXIS_NUMBERS: Final = {
+    one.name: one
+    for one in (
+        *BLOCK_NUMBERS[:2],
+        Number("tank_diameter", "m", shown="cm"),
+        Number("blocks", label="number of blocks"),
+        Number("flow_scale", label="strength of the flow"),
+        Number("stirring_length", "m", "length of the stirring", shown="cm"),
+        Number("bond_rate", "1/s", "rate at which bonds break"),
+        Number("flow"),
+        Number("glued", label="glued at the start"),
+        Number("latching"),
+        Number("faces"),
+        Number("hidden_face_drag", label="drag on hidden faces"),
+        Number("magnets"),
+    )
+}
+"""Their words, symbols and units for a reader, in the order from x to y."""
+
+
+def axis_number(name: str) -> Number:
+    """Return the words, the symbol and the unit of an axis for a reader."""
+    return AXIS_NUMBERS.get(name, Number(name))
+
+
 _DIMENSIONS: Final = "\n".join(f"{one.name}: settings, where it varies" for one in AXES)
 _REFERENCE: Final = attributes("""
     reference_runs number: runs of the reference

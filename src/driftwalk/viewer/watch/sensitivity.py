@@ -22,9 +22,10 @@ from driftwalk.assembly.sensitivity.times import (
 from driftwalk.page import encode_array
 from driftwalk.page.parts import axis, section
 from driftwalk.page.sections.outcomes import cells_of
-from driftwalk.page.sections.sensitivity_maps import AXES, axis_words, over_time_part, ranked_axes
+from driftwalk.page.sections.sensitivity_maps import over_time_part, ranked_axes
 from driftwalk.plot.parts.assembly_labels import classes_to_show
 from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.schema.kinds.sensitivity import axis_number
 from driftwalk.schema.shapes import counted_assemblies
 from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
 
@@ -69,7 +70,7 @@ class RunningSensitivity(Running):
         """Return the map up to now: of the last two axes, the others at their first value."""
         names = list(self._axes)
         fixed = names[: max(len(names) - 2, 0)]
-        at = ", ".join(f"{axis_words(name)} {self._axes[name][0]}" for name in fixed)
+        at = ", ".join(f"{axis_number(name).plain} {self._axes[name][0]}" for name in fixed)
         across, *up = ranked_axes(names[-2:])
         return [
             section(
@@ -181,8 +182,8 @@ def _blocks(count: Mapping[str, int]) -> int:
 
 def _axis(name: str, values: tuple[Any, ...]) -> dict[str, Any]:
     """Return an axis; words stand as their numbers, and in the label."""
-    label, unit, _ = AXES.get(name, (axis_words(name), "1", ""))
+    number = axis_number(name)
     if any(isinstance(value, str) for value in values):
         words = ", ".join(f"{number}: {value}" for number, value in enumerate(values))
-        return axis(name, f"{label} ({words})", unit, range(len(values)))
-    return axis(name, label, unit, values)
+        return axis(name, f"{number.words} ({words})", number.unit, range(len(values)))
+    return axis(name, number.words, number.unit, values)
