@@ -152,8 +152,8 @@ void PreparedRun<T>::prepare_shape(const BatchModel& model) {
   shape.corners = corners_.data();
   shape.corner_count = model.corner_count;
   if (model.corner_count == 4) {
-    shape.half_length = abs(corners_[0].x);
-    shape.half_width = abs(corners_[0].y);
+    shape.half_length = std::abs(corners_[0].x);
+    shape.half_width = std::abs(corners_[0].y);
   }
   shape.disc_radius = static_cast<T>(model.disc_radius);
   shape.reach = static_cast<T>(reach);

@@ -191,7 +191,7 @@ def block_pull(study: Study, table: MeasuredAttraction | None = None) -> BlockPu
     Raises
     ------
     InputError
-        When a magnet has no room in its block, discs have magnets, no typed face has a pole, or a
+        When a magnet has no room in its block, discs have magnets, rectangles any interaction, no typed face has a pole, or a
         table cannot be read.
 
     Examples
@@ -203,6 +203,11 @@ def block_pull(study: Study, table: MeasuredAttraction | None = None) -> BlockPu
     """
     if not study.interaction.is_on:
         return None
+    if study.block.shape == "rectangle":
+        raise InputError(
+            "[interaction] has laws between squares and between discs, none between rectangles: "
+            "leave it out (`interaction`), or take squares"
+        )
     mass = study.block.mass_kg * (1.0 + study.forces.added_mass_share)
     given = study.interaction
     measured = table or table_of(study)
