@@ -191,8 +191,8 @@ def block_pull(study: Study, table: MeasuredAttraction | None = None) -> BlockPu
     Raises
     ------
     InputError
-        When a magnet has no room in its block, discs have magnets, rectangles any interaction, no typed face has a pole, or a
-        table cannot be read.
+        When a magnet has no room in its block, discs have magnets, rectangles any interaction, no
+        typed face has a pole, or a table cannot be read.
 
     Examples
     --------
