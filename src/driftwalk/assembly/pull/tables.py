@@ -206,7 +206,7 @@ def block_pull(study: Study, table: MeasuredAttraction | None = None) -> BlockPu
     if study.block.shape == "rectangle":
         raise InputError(
             "[interaction] has laws between squares and between discs, none between rectangles: "
-            "leave it out (`interaction`), or take squares"
+            "leave the section out, or take squares"
         )
     mass = study.block.mass_kg * (1.0 + study.forces.added_mass_share)
     given = study.interaction

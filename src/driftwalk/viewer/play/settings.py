@@ -128,8 +128,8 @@ def knobs_for(tank: LiveTank, *, most_blocks: int) -> dict[str, Knob]:
     """
     if tank.study.block.shape == "rectangle":
         raise InputError(
-            "play draws squares and discs, and the body is a rectangle (`block.shape`): take "
-            "`assemble --path` and its film, or play with squares"
+            "the playground draws squares and discs, and the body is a rectangle (`block.shape`): "
+            "play with squares, or film the runs of an assembly"
         )
     values = values_of(tank, speed=1.0)
     knobs = {knob.name: knob.reaching(values[knob.name]) for knob in KNOBS}
