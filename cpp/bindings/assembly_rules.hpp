@@ -17,6 +17,7 @@ inline driftwalk::AssemblyRules rules_of(const Model& model, std::size_t blocks)
   rules.blocks = static_cast<int>(blocks);
   rules.side = 2 * run.block.half_side;
   rules.round = run.shape.disc_radius > 0;
+  rules.width = 2 * run.shape.half_width;
   // Where blocks meet only ratios of the two count, and an added share is common to both.
   rules.mass = model.numbers().mass;
   rules.inertia = model.numbers().inertia;

@@ -41,7 +41,8 @@ bool is_inside(const AssemblyRules& rules, const Placed& p) {
   if (rules.round) {
     return is_within(rules, p.at, rules.side / 2);
   }
-  const Vec2 along = p.axis * (rules.side / 2), across{-along.y, along.x};
+  const Vec2 along = p.axis * (rules.side / 2);
+  const Vec2 across = Vec2{-p.axis.y, p.axis.x} * (width_of(rules) / 2);
   for (const double sign_x : {-1.0, 1.0}) {
     for (const double sign_y : {-1.0, 1.0}) {
       if (!is_within(rules, p.at + along * sign_x + across * sign_y, 0)) {
@@ -61,9 +62,8 @@ bool is_clear(const AssemblyRules& rules, const Placed& p, const double* start, 
       }
       continue;
     }
-    if (dot(between, between) < 2 * rules.side * rules.side &&
-        overlap_depth(rules.side / 2, between, p.axis, {std::cos(start[2]), std::sin(start[2])}) >=
-            0) {
+    if (dot(between, between) < square_of_diagonal(rules) &&
+        overlap_depth(rules, between, p.axis, {std::cos(start[2]), std::sin(start[2])}) >= 0) {
       return false;
     }
   }

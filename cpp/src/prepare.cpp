@@ -151,6 +151,10 @@ void PreparedRun<T>::prepare_shape(const BatchModel& model) {
   shape.panel_count = model.panel_count;
   shape.corners = corners_.data();
   shape.corner_count = model.corner_count;
+  if (model.corner_count == 4) {
+    shape.half_length = std::abs(corners_[0].x);
+    shape.half_width = std::abs(corners_[0].y);
+  }
   shape.disc_radius = static_cast<T>(model.disc_radius);
   shape.reach = static_cast<T>(reach);
   shape.turning_share = static_cast<T>(turning / width);

@@ -49,9 +49,9 @@ Bond& bond_of(BondList& bonds, int first, int second) {
   return bonds.bond[at];
 }
 
-// The face of a block, in its own frame, that looks at a neighbour; 0 of discs.
+// The face of a block, in its own frame, that looks at a neighbour; 0 without a lattice.
 int face_at(const AssemblyRules& rules, const Scene& scene, int block, int neighbour) {
-  if (rules.round) {
+  if (!on_lattice(rules)) {
     return 0;
   }
   const SceneBlock &own = scene.block[block], &other = scene.block[neighbour];

@@ -21,11 +21,20 @@ struct Manifold {
   int count;
 };
 
-// The corners of the second square's face that looks at the reference face, cut to its width; of
+// Half a block's extent along a normal of one of its faces, and half the width of that face.
+struct Halves {
+  double depth, width;
+};
+Halves halves_of(const AssemblyRules& rules, Vec2 axis, Vec2 normal) {
+  const double length = rules.side / 2, width = width_of(rules) / 2;
+  return std::abs(dot(axis, normal)) > std::abs(cross(axis, normal)) ? Halves{length, width}
+                                                                     : Halves{width, length};
+}
+
+// The corners of the second block's face that looks at the reference face, cut to its width; of
 // discs the middle between their centres.
 Manifold manifold_of(const AssemblyRules& rules, const Scene& scene, BlockPair pair,
                      const Overlap& overlap) {
-  const double half_side = rules.side / 2;
   Manifold found{overlap.normal, {}, 0};
   const SceneAssembly& a = assembly_of(scene, pair.first);
   const SceneAssembly& b = assembly_of(scene, pair.second);
@@ -38,26 +47,26 @@ Manifold manifold_of(const AssemblyRules& rules, const Scene& scene, BlockPair p
   const int incident = overlap.reference_is_first ? pair.second : pair.first;
   const Vec2 out = overlap.normal * (overlap.reference_is_first ? 1.0 : -1.0);
   const Vec2 along{-out.y, out.x};
-  const SceneAssembly& other = assembly_of(scene, incident);
-  int facing = 0;
-  for (int face = 1; face < 4; ++face) {
-    if (dot(face_normal(other, face), out) < dot(face_normal(other, facing), out)) {
-      facing = face;
-    }
+  const Vec2 own = axis_of(rules, scene, reference), axis = axis_of(rules, scene, incident);
+  const Vec2 normals[4] = {axis, {-axis.y, axis.x}, {-axis.x, -axis.y}, {axis.y, -axis.x}};
+  Vec2 n = normals[0];
+  for (const Vec2& normal : normals) {
+    n = dot(normal, out) < dot(n, out) ? normal : n;
   }
-  const Vec2 n = face_normal(other, facing), t{-n.y, n.x};
-  const Vec2 middle = centre(scene, incident) + n * half_side - centre(scene, reference);
-  Vec2 ends[2] = {middle + t * half_side, middle - t * half_side};
+  const Vec2 t{-n.y, n.x};
+  const Halves half = halves_of(rules, own, out), other = halves_of(rules, axis, n);
+  const Vec2 middle = centre(scene, incident) + n * other.depth - centre(scene, reference);
+  Vec2 ends[2] = {middle + t * other.width, middle - t * other.width};
   for (Vec2& end : ends) {
     const Vec2& opposite = &end == &ends[0] ? ends[1] : ends[0];
     const double here = dot(end, along), there = dot(opposite, along);
-    const double bound = std::clamp(here, -half_side, half_side);
+    const double bound = std::clamp(here, -half.width, half.width);
     if (bound != here && here != there) {
       end = end + (opposite - end) * ((bound - here) / (there - here));
     }
   }
   for (const Vec2& end : ends) {
-    const double depth = half_side - dot(end, out);
+    const double depth = half.depth - dot(end, out);
     if (depth > 0) {
       const Vec2 at = end + centre(scene, reference);
       found.touch[found.count++] = {at - Vec2{a.x, a.y}, at - Vec2{b.x, b.y}, depth};

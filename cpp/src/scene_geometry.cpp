@@ -1,4 +1,4 @@
-// Geometry of a scene: overlaps of squares, members of assemblies, the wall.
+// Geometry of a scene: overlaps of squares and rectangles, members of assemblies, the wall.
 #include "driftwalk/assembly/settle_parts.hpp"
 
 #include <algorithm>
@@ -12,14 +12,30 @@ double half_extent(double half_side, Vec2 axis_first, Vec2 axis_second) {
   return half_side *
          (std::abs(dot(axis_first, axis_second)) + std::abs(cross(axis_first, axis_second)));
 }
+
+// How far two blocks reach towards each other along the axes of either one's side (`reach[0]`) and
+// across it (`reach[1]`).
+void reach_of(const AssemblyRules& rules, Vec2 axis_first, Vec2 axis_second, double (&reach)[2]) {
+  const double length = rules.side / 2, width = rules.width / 2;
+  if (on_lattice(rules)) {
+    reach[0] = reach[1] = length + half_extent(length, axis_first, axis_second);
+    return;
+  }
+  const double same = std::abs(dot(axis_first, axis_second));
+  const double turned = std::abs(cross(axis_first, axis_second));
+  reach[0] = length + length * same + width * turned;
+  reach[1] = width + length * turned + width * same;
+}
 } // namespace
 
-double overlap_depth(double half_side, Vec2 between, Vec2 axis_first, Vec2 axis_second) {
-  const double reach = half_side + half_extent(half_side, axis_first, axis_second);
-  const double apart =
-      std::max({std::abs(dot(between, axis_first)), std::abs(cross(axis_first, between)),
-                std::abs(dot(between, axis_second)), std::abs(cross(axis_second, between))});
-  return reach - apart;
+double overlap_depth(const AssemblyRules& rules, Vec2 between, Vec2 axis_first, Vec2 axis_second) {
+  double reach[2];
+  reach_of(rules, axis_first, axis_second, reach);
+  const double along =
+      std::max(std::abs(dot(between, axis_first)), std::abs(dot(between, axis_second)));
+  const double across =
+      std::max(std::abs(cross(axis_first, between)), std::abs(cross(axis_second, between)));
+  return std::min(reach[0] - along, reach[1] - across);
 }
 
 Overlap overlap_of(const AssemblyRules& rules, const Scene& scene, int first, int second) {
@@ -28,15 +44,14 @@ Overlap overlap_of(const AssemblyRules& rules, const Scene& scene, int first, in
     const double apart = std::sqrt(dot(between, between));
     return {rules.side - apart, between * (1 / std::max(apart, 1e-9)), true};
   }
-  const SceneAssembly& a = assembly_of(scene, first);
-  const SceneAssembly& b = assembly_of(scene, second);
-  const Vec2 axes[4] = {face_normal(a, 0), face_normal(a, 1), face_normal(b, 0), face_normal(b, 1)};
-  const double half_side = rules.side / 2;
-  const double reach = half_side + half_extent(half_side, axes[0], axes[2]);
+  const Vec2 a = axis_of(rules, scene, first), b = axis_of(rules, scene, second);
+  const Vec2 axes[4] = {a, {-a.y, a.x}, b, {-b.y, b.x}};
+  double reach[2];
+  reach_of(rules, a, b, reach);
   Overlap least{HUGE_VAL, {0, 0}, true};
   for (int k = 0; k < 4; ++k) {
     const double along = dot(between, axes[k]);
-    const double depth = reach - std::abs(along);
+    const double depth = reach[k & 1] - std::abs(along);
     if (depth < least.depth) {
       least = {depth, axes[k] * (along < 0 ? -1.0 : 1.0), k < 2};
     }
@@ -98,8 +113,8 @@ void join_faces(Scene& scene, const SceneAssembly& a) {
   }
 }
 
-// Of discs from where they are.
-void measure_discs(const AssemblyRules& rules, Scene& scene, SceneAssembly& a) {
+// Of what latches as it lies, from where it is.
+void measure_places(const AssemblyRules& rules, Scene& scene, SceneAssembly& a) {
   Vec2 sum{0, 0};
   for (int b = a.first; b >= 0; b = scene.block[b].next) {
     sum = sum + centre(scene, b);
@@ -123,8 +138,8 @@ void measure_assembly(const AssemblyRules& rules, Scene& scene, int assembly) {
 
 void measure_members(const AssemblyRules& rules, Scene& scene, int assembly) {
   SceneAssembly& a = scene.assembly[assembly];
-  if (rules.round) {
-    measure_discs(rules, scene, a);
+  if (!on_lattice(rules)) {
+    measure_places(rules, scene, a);
     return;
   }
   int sum_x = 0, sum_y = 0;
@@ -166,7 +181,7 @@ void measure_corner(const AssemblyRules& rules, Vec2 corner, double radius, Beyo
 
 // Whether a block there is within a circular wall whatever its angle; of a polygon it says no.
 bool is_clear_of_wall(const AssemblyRules& rules, Vec2 middle) {
-  const double inner = rules.radius - rules.side * std::sqrt(0.5);
+  const double inner = rules.radius - std::sqrt(square_of_diagonal(rules)) / 2;
   return inner > 0 && dot(middle, middle) < inner * inner;
 }
 } // namespace
@@ -174,8 +189,6 @@ bool is_clear_of_wall(const AssemblyRules& rules, Vec2 middle) {
 Beyond beyond_wall(const AssemblyRules& rules, const Scene& scene, int assembly) {
   Beyond most{-HUGE_VAL, {0, 0}};
   const SceneAssembly& a = scene.assembly[assembly];
-  const Vec2 along = face_normal(a, 0) * (rules.side / 2);
-  const Vec2 across = face_normal(a, 1) * (rules.side / 2);
   for (int b = a.first; b >= 0; b = scene.block[b].next) {
     const Vec2 middle = centre(scene, b);
     if (is_clear_of_wall(rules, middle)) {
@@ -185,6 +198,9 @@ Beyond beyond_wall(const AssemblyRules& rules, const Scene& scene, int assembly)
       measure_corner(rules, middle, rules.side / 2, most);
       continue;
     }
+    const Vec2 axis = axis_of(rules, scene, b);
+    const Vec2 along = axis * (rules.side / 2);
+    const Vec2 across = Vec2{-axis.y, axis.x} * (width_of(rules) / 2);
     for (const Vec2& corner : {along + across, along - across, across - along,
                                Vec2{-along.x - across.x, -along.y - across.y}}) {
       measure_corner(rules, middle + corner, 0, most);

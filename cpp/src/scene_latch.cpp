@@ -1,5 +1,5 @@
-// Latching: two faces that meet make two assemblies one, on the lattice of the heavier. Discs that
-// meet do so as they lie.
+// Latching: two faces that meet make two assemblies one, on the lattice of the heavier. Discs and
+// rectangles that meet do so as they lie.
 #include "driftwalk/assembly/settle_parts.hpp"
 
 #include <algorithm>
@@ -9,8 +9,8 @@ namespace driftwalk {
 
 namespace {
 struct Candidate {
-  int first, face, second, peer; // faces in the frames of their assemblies; 0 of discs
-  double squared;                // distance of the face centres, or of the discs' [m^2]
+  int first, face, second, peer; // faces in the frames of their assemblies; 0 without a lattice
+  double squared;                // distance of the face centres, or of the blocks' [m^2]
 };
 
 bool comes_before(const Candidate& a, const Candidate& b) {
@@ -33,7 +33,7 @@ bool is_free(const Scene& scene, int block, int face) {
 // Whether two free faces can latch, by the rule in force.
 bool can_latch(const AssemblyRules& rules, const Scene& scene, Candidate& c) {
   const Vec2 between = centre(scene, c.second) - centre(scene, c.first);
-  if (rules.round) {
+  if (!on_lattice(rules)) {
     c.squared = dot(between, between);
     return c.face == 0 && c.peer == 0;
   }
@@ -139,7 +139,7 @@ bool overlaps(const AssemblyRules& rules, const Scene& scene, int block, int oth
   const Vec2 between = was - centre(scene, block);
   const ScenePose& before = assembly_of(scene, other).before;
   return dot(between, between) < 2 * rules.side * rules.side &&
-         overlap_depth(rules.side / 2, between, face_normal(assembly_of(scene, block), 0),
+         overlap_depth(rules, between, face_normal(assembly_of(scene, block), 0),
                        {before.cosine, before.sine}) > tolerance;
 }
 
@@ -214,14 +214,27 @@ void align(Scene& scene, const Merge& merge, int joint) {
   }
 }
 
-// Discs stay as they lie, but for their overlap: both move apart, in inverse proportion to their
-// masses.
-void join_discs(const AssemblyRules& rules, Scene& scene, const Merge& merge, int joint) {
+// Turns a block in the frame of its assembly, from that of another one.
+void turn_by(SceneBlock& block, double angle, Vec2 onto) {
   constexpr double full_turn = 2 * 3.141592653589793;
+  block.turn += angle;
+  block.turn -= full_turn * std::floor(block.turn / full_turn);
+  const double c = onto.x * block.turn_cosine - onto.y * block.turn_sine;
+  const double s = onto.y * block.turn_cosine + onto.x * block.turn_sine;
+  const double length = std::sqrt(c * c + s * s);
+  block.turn_cosine = c / length;
+  block.turn_sine = s / length;
+}
+
+// Discs and rectangles stay as they lie, but for their overlap: both move apart, in inverse
+// proportion to their masses.
+void join_as_they_lie(const AssemblyRules& rules, Scene& scene, const Merge& merge, int joint) {
   SceneAssembly &stays = scene.assembly[merge.stays], &moves = scene.assembly[merge.moves];
   const Overlap overlap = overlap_of(rules, scene, merge.anchor, merge.guest);
   const Vec2 share = overlap.normal * (overlap.depth / (stays.blocks + moves.blocks));
   const double turned = moves.theta - stays.theta;
+  const Vec2 onto{dot(face_normal(stays, 0), face_normal(moves, 0)),
+                  cross(face_normal(stays, 0), face_normal(moves, 0))};
   for (int b = stays.first; b >= 0; b = scene.block[b].next) {
     SceneBlock& block = scene.block[b];
     block.x -= share.x * moves.blocks;
@@ -233,8 +246,7 @@ void join_discs(const AssemblyRules& rules, Scene& scene, const Merge& merge, in
     block.x += share.x * stays.blocks;
     block.y += share.y * stays.blocks;
     block.assembly = joint;
-    block.turn += turned;
-    block.turn -= full_turn * std::floor(block.turn / full_turn);
+    turn_by(block, turned, onto);
   }
 }
 
@@ -259,10 +271,10 @@ void link_both(Scene& scene, const SceneAssembly& a, const SceneAssembly& b, Sce
 }
 
 // Moves the guests' assembly onto the other's lattice. False, and nothing changed, when the two
-// would overlap each other or a third, or cannot both be inside the tank. What discs would overlap
-// latches next.
+// would overlap each other or a third, or cannot both be inside the tank. What would overlap
+// without a lattice latches next.
 bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
-  if (!rules.round && !cells_are_free(scene, merge)) {
+  if (on_lattice(rules) && !cells_are_free(scene, merge)) {
     return false;
   }
   constexpr int most_rounds = 64;
@@ -272,10 +284,10 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
                             (merge.guest_face - scene.block[merge.guest].quarter) & 3};
   copy_members(kept, scene.block, scene.blocks_before);
   copy_members(moved, scene.block, scene.blocks_before);
-  if (rules.round) {
-    join_discs(rules, scene, merge, joint);
-  } else {
+  if (on_lattice(rules)) {
     align(scene, merge, joint);
+  } else {
+    join_as_they_lie(rules, scene, merge, joint);
   }
   const Vec2 anchor = centre(scene, merge.anchor);
   scene.assembly[std::max(merge.stays, merge.moves)].blocks = 0;
@@ -286,7 +298,7 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
   conserve_momentum(kept, moved, rules.mass, body);
   place_by(scene, joint, merge.anchor, anchor);
   if (!push_inside(rules, scene, joint, most_rounds) ||
-      (!rules.round && !is_clear_of_others(rules, scene, joint)) ||
+      (on_lattice(rules) && !is_clear_of_others(rules, scene, joint)) ||
       (rules.faces != nullptr && poles_refuse(*rules.faces, scene, kept.first, moved.first))) {
     copy_members(kept, scene.blocks_before, scene.block);
     copy_members(moved, scene.blocks_before, scene.block);

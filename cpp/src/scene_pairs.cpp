@@ -9,7 +9,7 @@ namespace driftwalk {
 namespace {
 // No pair farther apart than this touches or latches.
 double touching_reach(const AssemblyRules& rules) {
-  const double touching = rules.side * std::sqrt(2.0);
+  const double touching = std::sqrt(square_of_diagonal(rules));
   const double latching =
       rules.latching == Latching::connector ? rules.side + rules.connector_distance : 0.0;
   return std::max(touching, latching);

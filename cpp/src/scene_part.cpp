@@ -21,8 +21,9 @@ void cut_loose(const AssemblyRules& rules, Scene& scene, const SceneAssembly& fr
 
 bool are_neighbours(const AssemblyRules& rules, const Scene& scene, int first, int second) {
   const SceneBlock &a = scene.block[first], &b = scene.block[second];
-  if (rules.round) {
-    return overlap_of(rules, scene, first, second).depth >= -contact_gap * rules.side;
+  if (!on_lattice(rules)) {
+    const double side = std::max(rules.side, rules.width);
+    return overlap_of(rules, scene, first, second).depth >= -contact_gap * side;
   }
   return std::abs(a.cell_x - b.cell_x) + std::abs(a.cell_y - b.cell_y) == 1;
 }
@@ -111,9 +112,12 @@ void join_blocks(const AssemblyRules& rules, Scene& scene, const LiveBlocks& joi
     block.cell_y = joined.cell[2 * b + 1];
     block.quarter = joined.quarter[b];
     block.kind = static_cast<std::uint8_t>(joined.kind[b]);
-    if (rules.round) {
-      const double turn = scene.assembly[b].theta - scene.assembly[lowest].theta;
+    if (!on_lattice(rules)) {
+      const SceneAssembly &own = scene.assembly[b], &body = scene.assembly[lowest];
+      const double turn = own.theta - body.theta;
       block.turn = turn - full_turn * std::floor(turn / full_turn);
+      block.turn_cosine = own.cosine * body.cosine + own.sine * body.sine;
+      block.turn_sine = own.sine * body.cosine - own.cosine * body.sine;
     }
     if (lowest != b) {
       scene.assembly[b].blocks = 0;

@@ -64,6 +64,7 @@ AssemblyRules rules_of(const Run& run, const Rules& given, int blocks) {
   rules.blocks = blocks;
   rules.side = 2 * view.block.half_side;
   rules.round = view.shape.disc_radius > 0;
+  rules.width = 2 * view.shape.half_width;
   rules.mass = run.mass;
   rules.inertia = run.inertia;
   rules.radius = view.wall.radius;

@@ -162,6 +162,21 @@ def test_outcomes_are_counted(saved: Path, visit: Callable[..., Visit]) -> None:
     expect(page.get_by_text("The settings have changed since then.")).to_be_visible()
 
 
+def test_the_table_of_outcomes_stays_open_and_focused_as_the_counts_go_on(
+    saved: Path, visit: Callable[..., Visit]
+) -> None:
+    page = visit(LOCAL).open(saved.as_uri())
+    page.wait_for_selector("[data-steps]")
+    page.click("[data-action=count]")
+    page.wait_for_selector("[data-done='200']")
+    page.click("[data-done] summary")
+    page.evaluate("document.querySelector('[data-done] details').dataset.before = ''")
+    page.evaluate("document.querySelector('[data-action=count]').click()")
+    page.wait_for_selector("[data-done] details:not([data-before])")
+    assert page.evaluate("document.activeElement.matches('[data-done] details[open] > summary')")
+    page.wait_for_selector("[data-done] table")
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_keyboard_leads_to_every_control(
     saved: Path, visit: Callable[..., Visit], scheme: str

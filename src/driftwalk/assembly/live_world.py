@@ -54,13 +54,13 @@ class _Moment:
         self.time = float(times_of(np.array(world.step), time_step=study.time_step_s))
         self._chirality = study.assembly.chirality
         self.table = face_table(study.assembly)
-        self._diameter = study.block.side_m if study.block.is_round else 0.0
+        self._block = study.block
 
     @cached_property
     def outcome(self) -> str:
-        if self._diameter:
+        if not self._block.has_lattice:
             pose, labels = self.state["pose"], self.state["assembly"]
-            return disc_class(pose, labels, diameter=self._diameter)
+            return disc_class(pose, labels, **self._block.contact_size)
         return LatticeWorld.of(self.state).outcome(self._chirality)
 
 
@@ -313,9 +313,9 @@ class LiveTank:
         return self._wishes.study
 
     @property
-    def is_round(self) -> bool:
-        """Whether the blocks are discs."""
-        return self._wishes.study.block.is_round
+    def has_lattice(self) -> bool:
+        """Whether the blocks are squares, which latch face to face; others latch as they lie."""
+        return self._wishes.study.block.has_lattice
 
     @property
     def flow_scale(self) -> float:
@@ -462,13 +462,13 @@ class LiveTank:
         bonds = BondGraph(1, lattice.blocks)
         bonds.put(np.zeros(len(state["bond"]), dtype=np.int64), state["bond"], True)
         found = self._world.advance(steps)
-        pose, diameter = self._world.state()["pose"], study.block.side_m
+        pose = self._world.state()["pose"]
         times = times_of(found["step"], time_step=study.time_step_s).tolist()
         kinds, pairs, faces = (found[name].tolist() for name in ("kind", "block", "face"))
         for time, kind, pair, joined in zip(times, kinds, pairs, faces, strict=True):
             blocks = (pair[0], pair[1])
             bonds.put(np.zeros(1, dtype=np.int64), np.array([pair]), kind in (JOINING, CLOSING))
-            if kind == JOINING and not self.is_round:
+            if kind == JOINING and self.has_lattice:
                 lattice.join(blocks, (joined[0], joined[1]))
             elif kind == JOINING:
                 lattice.partition.unite(blocks)
@@ -477,8 +477,8 @@ class LiveTank:
                 lattice.partition.cut(np.flatnonzero(side).tolist())
             else:
                 continue
-            if self.is_round:
-                outcome = disc_class(pose, lattice.partition.labels, diameter=diameter)
-            else:
+            if self.has_lattice:
                 outcome = lattice.outcome(study.assembly.chirality)
+            else:
+                outcome = disc_class(pose, lattice.partition.labels, **study.block.contact_size)
             self._events.append(LiveEvent(time, blocks, outcome, is_parting=kind == PARTING))

@@ -407,13 +407,15 @@ class TankBatch:
             return
         state, sound = self._batch.state(), self.sound
         self._resting = self._rests & (state["assembly"] == 0).all(axis=1)
-        side, rules = self._study.block.side_m, self._study.assembly
+        rules = self._study.assembly
         for world in np.flatnonzero(changed).tolist():
             own = {name: values[world] for name, values in state.items()}
             if not sound[world]:
                 self._outcome[world] = ""
-            elif self._study.block.is_round:
-                self._outcome[world] = disc_class(own["pose"], own["assembly"], diameter=side)
+            elif not self._study.block.has_lattice:
+                self._outcome[world] = disc_class(
+                    own["pose"], own["assembly"], **self._study.block.contact_size
+                )
             else:
                 address = own["assembly"].tobytes() + own["cell"].tobytes()
                 if address not in self._names:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypedDict
 
 from pydantic import Field, ModelWrapValidatorHandler, model_validator
 
@@ -11,6 +11,15 @@ from driftwalk.model.section import OrNumber, Placeholder, Quantity, Section
 
 if TYPE_CHECKING:
     from driftwalk.model.bodies import RigidBody
+
+
+class BodySize(TypedDict):
+    """Size of a disc or a rectangle [m]."""
+
+    diameter: float
+    """Of a disc; length of a rectangle along its own x."""
+    width: float | None
+    """Of a rectangle, along its own y; None of a disc."""
 
 
 class Block(Section):
@@ -123,6 +132,16 @@ class Block(Section):
     def is_round(self) -> bool:
         """Whether the body is a disc: without heading, faces and lattice."""
         return self.shape == "disc"
+
+    @property
+    def has_lattice(self) -> bool:
+        """Whether blocks latch face to face, as squares do; discs and rectangles as they lie."""
+        return self.shape == "square"
+
+    @property
+    def contact_size(self) -> BodySize:
+        """Size of a disc or a rectangle, by the names that tell what touches."""
+        return {"diameter": self.side_m, "width": self.width_m}
 
     @property
     def described(self) -> str:

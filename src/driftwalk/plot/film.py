@@ -46,6 +46,7 @@ class _Scene:
     theta: Floats
     color: Integers
     side: float | None
+    slimness: float
     arena: dict[str, Any]
     pole: Any = None
     """Poles of the faces, (body, face); None: none are known."""
@@ -155,6 +156,7 @@ def _scene(motion: xr.Dataset, run: int) -> _Scene:
         np.asarray(one["theta"].values, dtype=np.float64),
         np.asarray(color, dtype=np.int64),
         None if side is None else CM_PER_M * float(side),
+        motion.attrs.get("block_width_m", side or 1.0) / (side or 1.0),
         arena_of(motion),
         poles_of(motion),
     )
@@ -287,8 +289,11 @@ def _outlines(scene: _Scene, sample: Integers, body: Integers, size: float) -> l
     theta = scene.theta[sample, body]
     square = np.isfinite(theta) & (scene.side is not None)
     place = scene.place[sample, body][:, None]
-    angle = (np.where(square, theta, 0.0) + np.pi / 4.0)[:, None] + np.pi / 2.0 * np.arange(4)
-    corners = place + size * np.sqrt(2.0) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    half = np.arctan(scene.slimness)
+    corner = np.array([half, np.pi - half, np.pi + half, -half])
+    angle = np.where(square, theta, 0.0)[:, None] + corner
+    reach = size * np.hypot(1.0, scene.slimness)
+    corners = place + reach * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     round_ = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     circles = place + size * np.stack([np.cos(round_), np.sin(round_)], axis=-1)
     return [corners[n] if one else circles[n] for n, one in enumerate(square)]

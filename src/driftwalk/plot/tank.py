@@ -218,7 +218,7 @@ def block_corners(dataset: xr.Dataset) -> Floats:
     ----------
     dataset : xarray.Dataset
         Poses ``x``, ``y`` [m] and ``theta`` [rad], last dimension ``block``, and the attribute
-        ``block_side_m``.
+        ``block_side_m``; of rectangles ``block_width_m`` too.
 
     Returns
     -------
@@ -241,6 +241,8 @@ def block_corners(dataset: xr.Dataset) -> Floats:
         for name in POSES[:3]
     )
     own = half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    if "block_width_m" in dataset.attrs:
+        own[:, 1] *= dataset.attrs["block_width_m"] / dataset.attrs["block_side_m"]
     if dataset.attrs.get("block_shape") == "disc":
         angle = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
         own = half * np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -1,8 +1,9 @@
-"""Names of the contact graphs of discs, as they stand in the outcome classes of datasets.
+"""Names of the contact graphs of discs and rectangles, as they stand in outcome classes.
 
 A graph has a name of the literature (chain4, star4, ring4, triangle, paw, diamond) or is called by
 its contacts, the discs being letters: ``ab.ac.ad.be``. Of more than 8 discs only chains and rings
-have a name, and of others the two counts are said: ``9 discs, 10 contacts``.
+have a name, and of others the two counts are said: ``9 discs, 10 contacts``. Of rectangles the same
+holds: ``9 rectangles, 10 contacts``.
 """
 
 from __future__ import annotations
@@ -21,16 +22,16 @@ _LETTERS: Final = "abcdefgh"
 _NAMED: Final = {"triangle": "ab.ac.bc", "paw": "ab.ac.ad.bc", "diamond": "ab.ac.ad.bc.bd"}
 _NAMES: Final = {code: name for name, code in _NAMED.items()}
 _FAMILY: Final = re.compile(r"(chain|star|ring)(\d+)")
-_COUNTS: Final = re.compile(r"(\d+) discs, (\d+) contacts")
+_COUNTS: Final = re.compile(r"(\d+) (?:discs|rectangles), (\d+) contacts")
 _CODE: Final = re.compile(r"[a-h]{2}(\.[a-h]{2})+")
 
 
-def counted_graph(discs: int, contacts: int) -> str:
-    """Return the name of a graph of more than 8 discs."""
-    return f"{discs} discs, {contacts} contacts"
+def counted_graph(discs: int, contacts: int, noun: str = "discs") -> str:
+    """Return the name of a graph of more than 8 discs or rectangles (`noun`)."""
+    return f"{discs} {noun}, {contacts} contacts"
 
 
-def graph_name(discs: int, contacts: Iterable[tuple[int, int]]) -> str:
+def graph_name(discs: int, contacts: Iterable[tuple[int, int]], noun: str = "discs") -> str:
     """Return the name of a connected contact graph, the same however its discs are numbered.
 
     Parameters
@@ -39,6 +40,8 @@ def graph_name(discs: int, contacts: Iterable[tuple[int, int]]) -> str:
         Number of discs.
     contacts : iterable of (int, int)
         Pairs of discs that touch, by index from 0.
+    noun : str
+        What they are: "discs" or "rectangles".
 
     Examples
     --------
@@ -47,11 +50,11 @@ def graph_name(discs: int, contacts: Iterable[tuple[int, int]]) -> str:
     >>> graph_name(5, [(0, 1), (1, 2), (2, 3), (2, 4)])
     'ab.ac.ad.be'
     """
-    return _name(discs, tuple(sorted({(min(pair), max(pair)) for pair in contacts})))
+    return _name(discs, tuple(sorted({(min(pair), max(pair)) for pair in contacts})), noun)
 
 
 @lru_cache(maxsize=1 << 14)
-def _name(discs: int, contacts: Contacts) -> str:
+def _name(discs: int, contacts: Contacts, noun: str) -> str:
     if discs <= 2:
         return str(discs)
     degrees = [sum(disc in pair for pair in contacts) for disc in range(discs)]
@@ -63,7 +66,7 @@ def _name(discs: int, contacts: Contacts) -> str:
     if discs > 3 and set(degrees) == {2}:
         return f"ring{discs}"
     if discs > MOST_DISCS:
-        return counted_graph(discs, len(contacts))
+        return counted_graph(discs, len(contacts), noun)
     first = min(_numberings(discs, contacts))
     code = ".".join(_LETTERS[one] + _LETTERS[other] for one, other in first)
     return _NAMES.get(code, code)

@@ -127,10 +127,9 @@ def test_discs_start_apart_and_inside(start: list[Any], words: str) -> None:
     assemble(study(blocks=2), dw.tank30_flow(), runs=1, start=poses, duration=0.1)
 
 
-def test_a_rectangle_does_not_assemble() -> None:
-    body = {"shape": "rectangle", "side_m": 0.04, "width_m": 0.02}
-    with pytest.raises(InputError, match="squares and discs assemble, and the body is 'rectangle'"):
-        assemble(dw.Study(block=body), dw.tank30_flow(), runs=1)
+def test_glued_blocks_do_not_assemble_as_one_body() -> None:
+    with pytest.raises(InputError, match="squares, discs and rectangles assemble, and the body"):
+        assemble(dw.Study(block={"shape": "xx"}), dw.tank30_flow(), runs=1)
 
 
 def test_discs_of_a_live_tank_latch_part_and_lose_members() -> None:

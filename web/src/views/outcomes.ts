@@ -69,8 +69,15 @@ export class OutcomesPanel {
     ].join(" ");
     const frame = { id: "outcomes", kind: "classes", title: "", note: null, confidence: 0.9, runs: done };
     if (this.outdated) this.words.append(CHANGED);
+    // The table stays open, and under the keys, while the counts go on.
+    const table = this.body.querySelector("details");
+    const isOpen = table?.open ?? false;
+    const isFocused = table?.contains(document.activeElement) ?? false;
     this.body.replaceChildren();
     drawClasses({ ...frame, series: [{ name: "runs", items }] }, this.body);
+    const renewed = this.body.querySelector("details");
+    if (renewed !== null) renewed.open = isOpen;
+    if (isFocused) renewed?.querySelector("summary")?.focus();
     this.body.dataset["done"] = String(done);
     this.body.dataset["counts"] = JSON.stringify(Object.fromEntries(sorted));
   }

@@ -59,9 +59,11 @@ inline void sum_noise(const Physics<Real, T, Law>& physics, int half, Member<Rea
 // the water's, the mass that it pushes is at the block's centre, on the arm.
 template <class Real, class T, class Law>
 inline void add_water(const Physics<Real, T, Law>& physics, Real x, Real y, const Axes<Real>& axes,
-                      const Arm<Real>& arm, Sums<Real>& sums) {
+                      const Arm<Real>& arm, const Axes<Real>& turn, Sums<Real>& sums) {
+  const bool turns = physics.shape.disc_radius == T(0);
   const Motion<Real> water = physics.shape.panel_count > 0
-                                 ? water_acceleration(physics.water, physics.shape, axes, x, y)
+                                 ? water_acceleration(physics.water, physics.shape,
+                                                      turns ? turned_axes(axes, turn) : axes, x, y)
                                  : water_acceleration(physics.water, physics.block, x, y, axes);
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
   sums.part[0] = sums.part[0] * per_mass + water.vx;
@@ -91,12 +93,13 @@ inline void blend_hidden(const Physics<Real, T, Law>& physics, Real x, Real y,
   drag.conductance = drag.conductance + (full.conductance - drag.conductance) * share;
 }
 
-// Drag of a block in its assembly, about its own centre. Of discs none hides another: the sum over
-// the panels of each is that of a disc alone, not inlined for the squares' sake.
+// Drag of a block in its assembly, about its own centre. Of discs and rectangles none hides
+// another: the sum over the panels of each is that of one alone, not inlined for the squares' sake.
 template <class Real, class T, class Law>
-[[gnu::noinline]] DragSums<Real> drag_of_disc(const Physics<Real, T, Law>& physics, Real x, Real y,
-                                              const Axes<Real>& axes, const Motion<Real>& own) {
-  return panel_sums(physics.law, physics.shape, physics.flow, x, y, axes, own);
+[[gnu::noinline]] DragSums<Real> drag_of_panels(const Physics<Real, T, Law>& physics, Real x,
+                                                Real y, const Axes<Real>& axes,
+                                                const Motion<Real>& own, const Axes<Real>& turn) {
+  return panel_sums(physics.law, physics.shape, physics.flow, x, y, turned_axes(axes, turn), own);
 }
 
 template <class Real, class T, class Law>
@@ -104,7 +107,7 @@ inline DragSums<Real> drag_of_member(const Physics<Real, T, Law>& physics, Real 
                                      const Axes<Real>& axes, const Motion<Real>& own,
                                      const Member<Real>& m) {
   if (physics.shape.panel_count > 0) {
-    return drag_of_disc(physics, x, y, axes, own);
+    return drag_of_panels(physics, x, y, axes, own, m.turn);
   }
   const Real covered{static_cast<T>(closing_where_covered)};
   DragSums<Real> drag =
@@ -142,7 +145,7 @@ inline AheadMember<Real> ahead_of(const Physics<Real, T, Law>& physics, Member<R
 // Its drag, about its own centre, about its assembly's centre of mass.
 template <class Real, class T, class Law>
 inline void add_drag(const Physics<Real, T, Law>& physics, const AheadMember<Real>& ahead,
-                     const DragSums<Real>& drag, Sums<Real>& sums) {
+                     const DragSums<Real>& drag, const Axes<Real>& turn, Sums<Real>& sums) {
   const Arm<Real>& arm = ahead.arm;
   sums.part[0] = drag.force_x;
   sums.part[1] = drag.force_y;
@@ -150,7 +153,7 @@ inline void add_drag(const Physics<Real, T, Law>& physics, const AheadMember<Rea
   sums.part[3] = drag.conductance;
   sums.part[4] = drag.conductance * (arm.x * arm.x + arm.y * arm.y);
   if (physics.water.count > 0) {
-    add_water(physics, ahead.x, ahead.y, ahead.axes, arm, sums);
+    add_water(physics, ahead.x, ahead.y, ahead.axes, arm, turn, sums);
   }
 }
 
@@ -188,7 +191,7 @@ inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>* member
       for (int row = 0; row < rows; ++row) {
         const DragSums<Real> drag =
             faces.take(physics.block, physics.flow.unit, ahead[row].axes, ahead[row].own);
-        add_drag(physics, ahead[row], drag, sums[row]);
+        add_drag(physics, ahead[row], drag, members[row].turn, sums[row]);
       }
       return;
     }
@@ -197,7 +200,7 @@ inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>* member
     const AheadMember<Real> ahead = ahead_of(physics, members[row]);
     add_drag(physics, ahead,
              drag_of_member(physics, ahead.x, ahead.y, ahead.axes, ahead.own, members[row]),
-             sums[row]);
+             members[row].turn, sums[row]);
   }
 }
 

@@ -83,7 +83,8 @@ inline bool wear_bonds(const AssemblyRules& rules, const Physics<Real, T, Law>& 
                        double block_mass, int half, const PackMemory<Real>& memory, int world,
                        BondList& bonds, std::int32_t* side) {
   const double hazard = rules.bond_rate * physics.step.dt;
-  const double clear = rules.relatch_clearance * rules.side;
+  const double clear =
+      rules.relatch_clearance * (rules.side > rules.width ? rules.side : rules.width);
   const bool loaded = rules.bond_force > 0 || rules.bond_strength > 0;
   bool over = false;
   bool forgets = false;

@@ -142,8 +142,9 @@ private:
       Member<Real>& m = members_[row];
       Pose<Real> pose = m.pose;
       Motion<Real> motion = m.motion;
-      const auto touched =
-          meet_wall(wall_, h_, m.per_inertia, m.arm, [&](Real) { return m.axes; }, pose, motion);
+      const auto touched = meet_wall(
+          wall_, h_, m.per_inertia, m.arm, [&](Real) { return axes_at_wall(h_, m.axes, m); }, pose,
+          motion);
       if (!any(touched)) {
         continue;
       }
@@ -174,8 +175,9 @@ private:
     Motion<T> motion = one_lane(own.motion, lane);
     for (int i = crowd_.first(body); i < crowd_.end[body]; ++i) {
       const Arm<T> arm = one_lane(member(i).arm, lane_of_member(i));
+      const Axes<T> at_wall = own_axes(axes, i);
       meet_wall(
-          wall_, h_, T(get(own.per_inertia, lane)), arm, [&](T) { return axes; }, pose, motion);
+          wall_, h_, T(get(own.per_inertia, lane)), arm, [&](T) { return at_wall; }, pose, motion);
     }
     for (int i = crowd_.first(body); i < crowd_.end[body]; ++i) {
       Member<Real>& m = member(i);
@@ -202,7 +204,7 @@ private:
           continue;
         }
         Pose<Real> pose = m.pose;
-        const auto outside = push(tolerance, m.axes, m.arm, pose);
+        const auto outside = push(tolerance, axes_at_wall(h_, m.axes, m), m.arm, pose);
         if (!any(outside)) {
           continue;
         }
@@ -231,7 +233,7 @@ private:
     Pose<T> pose = one_lane(members_[lowest / lanes].pose, lane);
     for (int i = crowd_.first(body); i < crowd_.end[body]; ++i) {
       const Arm<T> arm = one_lane(member(i).arm, lane_of_member(i));
-      push_member<T, T>(wall_, h_, tolerance, true, axes, arm, pose);
+      push_member<T, T>(wall_, h_, tolerance, true, own_axes(axes, i), arm, pose);
     }
     for (int i = crowd_.first(body); i < crowd_.end[body]; ++i) {
       put_place(member(i), lane_of_member(i), pose);
@@ -246,8 +248,9 @@ private:
       Member<Real>& m = members_[b / lanes];
       const int lane = b % lanes;
       Pose<T> pushed = one_lane(m.pose, lane);
-      if (!push_member<T, T>(wall_, h_, tolerance, true, one_lane(m.axes, lane),
-                             one_lane(m.arm, lane), pushed)) {
+      if (!push_member<T, T>(wall_, h_, tolerance, true,
+                             one_lane(axes_at_wall(h_, m.axes, m), lane), one_lane(m.arm, lane),
+                             pushed)) {
         continue;
       }
       const int root = get(m.root, lane);
@@ -283,6 +286,14 @@ private:
     }
   }
   Member<Real>& member(int i) const { return members_[crowd_.order[i] / lanes]; }
+  // The axes of a member of an assembly with these axes.
+  Axes<T> own_axes(const Axes<T>& axes, int i) const {
+    if constexpr (std::is_same_v<Half, Box<T>>) {
+      return turned_axes(axes, one_lane(member(i).turn, lane_of_member(i)));
+    } else {
+      return axes;
+    }
+  }
   int lane_of_member(int i) const { return crowd_.order[i] % lanes; }
   static void put_place(Member<Real>& m, int lane, const Pose<T>& pose) {
     put(m.pose.x, lane, pose.x);
@@ -299,12 +310,9 @@ private:
 template <class Real, class T, class Law>
 inline void meet_walls(const Physics<Real, T, Law>& physics, Member<Real>* members,
                        Crowd<Real>& crowd, int rows) {
-  if (physics.shape.disc_radius > T(0)) {
-    CrowdAtWalls<Real, T, Disc<T>>(physics.wall, {physics.shape.disc_radius}, members, crowd, rows)
-        .meet();
-  } else {
-    CrowdAtWalls<Real, T, T>(physics.wall, physics.block.half_side, members, crowd, rows).meet();
-  }
+  with_half(physics.block, physics.shape, [&]<class Half>(const Half& half) {
+    CrowdAtWalls<Real, T, Half>(physics.wall, half, members, crowd, rows).meet();
+  });
 }
 
 // Whether a pair of the list overlaps or may latch.
@@ -320,8 +328,8 @@ inline bool is_to_settle(const NearRules<T>& rules, const Member<Real>* members,
     if (!(dx * dx + dy * dy < rules.reach * rules.reach)) {
       continue;
     }
-    const Axes<T> a = one_lane(members[first / lanes].axes, first % lanes);
-    const Axes<T> b = one_lane(members[second / lanes].axes, second % lanes);
+    const Axes<T> a = one_lane(near_axes(rules, members[first / lanes]), first % lanes);
+    const Axes<T> b = one_lane(near_axes(rules, members[second / lanes]), second % lanes);
     if (may_meet<T, T>(rules, dx, dy, a, b)) {
       return true;
     }

@@ -112,6 +112,8 @@ inline void load_block(const AssemblyRules& rules, const double* pose, const Pac
   put(m.offset_y, lane, T(0));
   put(m.arm.x, lane, T(0));
   put(m.arm.y, lane, T(0));
+  put(m.turn.cosine, lane, T(1));
+  put(m.turn.sine, lane, T(0));
   put(m.x, lane, pose[0]);
   put(m.y, lane, pose[1]);
   for (int face = 0; face < 4; ++face) {
@@ -165,6 +167,8 @@ inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack,
     block.joined = book.joined;
     block.kind = book.kind;
     block.turn = book.turn;
+    block.turn_cosine = book.turn_cosine;
+    block.turn_sine = book.turn_sine;
     block.offset_x = get(m.offset_x, lane);
     block.offset_y = get(m.offset_y, lane);
     assembly.blocks = 0;
@@ -243,12 +247,16 @@ inline void read_block(const AssemblyRules& rules, const Scene& scene, const Pac
   put(m.per_count, lane, 1.0 / body.blocks);
   put(m.offset_x, lane, block.offset_x);
   put(m.offset_y, lane, block.offset_y);
+  put(m.turn.cosine, lane, block.turn_cosine);
+  put(m.turn.sine, lane, block.turn_sine);
   pack.book(b, lane) = {static_cast<std::int16_t>(block.cell_x),
                         static_cast<std::int16_t>(block.cell_y),
                         static_cast<std::uint8_t>(block.quarter),
                         static_cast<std::uint8_t>(block.joined),
                         block.kind,
-                        block.turn};
+                        block.turn,
+                        block.turn_cosine,
+                        block.turn_sine};
   cover_faces(rules, pack, b, lane);
 }
 

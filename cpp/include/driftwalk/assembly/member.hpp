@@ -28,6 +28,7 @@ struct Member : Body<Real> {
   // of the block
   Real offset_x, offset_y; // from the centre of mass, in the assembly's frame [m]
   Arm<Real> arm;           // the same in the tank's frame
+  Axes<Real> turn;         // of what latches as it lies: its axes in the assembly's frame
   Real x, y;               // position [m]
   Bool covered[4];         // faces that the water does not reach
   Real normals[4];         // of this force interval and the next
@@ -35,6 +36,13 @@ struct Member : Body<Real> {
   Motion<Real> noise; // acceleration of the assembly by the stochastic forces
   Motion<Real> ahead; // v*
 };
+
+// The axes of a block that has turned from those of its assembly.
+template <class Real>
+inline Axes<Real> turned_axes(const Axes<Real>& axes, const Axes<Real>& turn) {
+  return {axes.cosine * turn.cosine - axes.sine * turn.sine,
+          axes.sine * turn.cosine + axes.cosine * turn.sine};
+}
 
 // Sums of a step, of a block and then of its assembly.
 inline constexpr int noise_sums = 3; // force per mass x, y; torque per mass
@@ -49,7 +57,7 @@ struct BlockBook {
   std::int16_t cell_x, cell_y;
   std::uint8_t quarter, joined;
   std::uint8_t kind = 0; // of typed faces
-  double turn = 0;
+  double turn = 0, turn_cosine = 1, turn_sine = 0;
 };
 
 // Where the world of a lane is in its run.

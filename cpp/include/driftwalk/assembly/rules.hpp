@@ -18,6 +18,7 @@ struct AssemblyRules {
   int blocks = 1;
   double side = 0, mass = 0, inertia = 0; // of one block
   bool round = false;                     // discs of this diameter instead of squares
+  double width = 0; // of rectangles, whose side lies along their own x; 0: squares or discs
   // Blocks that are glued at the start, as many in a row as a body has; one: they start alone.
   int glued = 1;
   const std::int32_t* glued_cells = nullptr; // [glued][x, y] on the body's lattice

@@ -13,13 +13,14 @@
 namespace driftwalk {
 
 struct SceneBlock {
-  int assembly;              // lowest block of its assembly
-  int next;                  // next member of the assembly, -1 after the last
-  int cell_x, cell_y;        // on the assembly's lattice
-  int quarter;               // its own frame is the assembly's turned by this many quarter turns
-  std::uint8_t kind;         // of typed faces
-  unsigned joined;           // bit f: face f (of the assembly's frame) has a neighbour
-  double turn;               // of a disc, in place of the quarter turns [rad], 0 to 2 pi
+  int assembly;       // lowest block of its assembly
+  int next;           // next member of the assembly, -1 after the last
+  int cell_x, cell_y; // on the assembly's lattice
+  int quarter;        // its own frame is the assembly's turned by this many quarter turns
+  std::uint8_t kind;  // of typed faces
+  unsigned joined;    // bit f: face f (of the assembly's frame) has a neighbour
+  // In place of the quarter turns, of what latches as it lies [rad], 0 to 2 pi.
+  double turn, turn_cosine, turn_sine;
   double offset_x, offset_y; // from the centre of mass, in the assembly's frame [m]
   double x, y;               // position [m]
 };
@@ -93,8 +94,8 @@ inline constexpr int most_cells_per_side = 64;
 inline constexpr int cell_heads = most_cells_per_side * most_cells_per_side + 2;
 // Lists of near pairs reach this many sides farther than what touches or latches.
 inline constexpr double pair_skin_sides = 0.7;
-// Discs of one assembly are in contact up to this gap, in diameters; chosen by hand: it is what two
-// of them move in a time step.
+// Discs, or rectangles, of one assembly are in contact up to this gap, in diameters or longer
+// sides; chosen by hand: it is what two of them move in a time step.
 inline constexpr double contact_gap = 0.01;
 // Up to this many blocks every pair is looked at; beyond, lists of near pairs.
 inline constexpr int most_blocks_all_pairs = 24;

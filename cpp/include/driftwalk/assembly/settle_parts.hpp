@@ -48,10 +48,29 @@ inline Vec2 face_normal(const SceneAssembly& a, int face) {
   }
 }
 
+// Squares latch on a lattice, discs and rectangles as they lie.
+inline bool on_lattice(const AssemblyRules& rules) {
+  return !rules.round && rules.width == 0;
+}
+inline double width_of(const AssemblyRules& rules) {
+  return rules.width > 0 ? rules.width : rules.side;
+}
+inline double square_of_diagonal(const AssemblyRules& rules) {
+  return rules.side * rules.side + width_of(rules) * width_of(rules);
+}
+// The axis of a block along its side: that of its assembly, of a rectangle its own.
+inline Vec2 axis_of(const AssemblyRules& rules, const Scene& scene, int block) {
+  const SceneAssembly& a = assembly_of(scene, block);
+  const SceneBlock& b = scene.block[block];
+  return rules.width > 0 ? Vec2{a.cosine * b.turn_cosine - a.sine * b.turn_sine,
+                                a.sine * b.turn_cosine + a.cosine * b.turn_sine}
+                         : Vec2{a.cosine, a.sine};
+}
+
 // Whether two blocks are so far apart that they cannot touch.
 inline bool are_far(const AssemblyRules& rules, const Scene& scene, int first, int second) {
   const Vec2 between = centre(scene, second) - centre(scene, first);
-  return !(dot(between, between) < 2 * rules.side * rules.side);
+  return !(dot(between, between) < square_of_diagonal(rules));
 }
 
 // Overlap of two blocks: its depth (negative when clear) and the axis of least penetration, which
@@ -63,7 +82,7 @@ struct Overlap {
 };
 Overlap overlap_of(const AssemblyRules& rules, const Scene& scene, int first, int second);
 // The depth alone, of blocks at given places with given axes.
-double overlap_depth(double half_side, Vec2 between, Vec2 axis_first, Vec2 axis_second);
+double overlap_depth(const AssemblyRules& rules, Vec2 between, Vec2 axis_first, Vec2 axis_second);
 
 // Links a block to the members of its assembly.
 inline void add_member(Scene& scene, SceneAssembly& assembly, int block) {
@@ -119,7 +138,7 @@ Beyond beyond_wall(const AssemblyRules& rules, const Scene& scene, int assembly)
 // Shifts an assembly inward, corner by corner, the farthest first; false when it stays outside.
 bool push_inside(const AssemblyRules& rules, Scene& scene, int assembly, int rounds);
 
-// Whether two blocks of one assembly are neighbours: on its lattice, or discs that touch.
+// Whether two blocks of one assembly are neighbours: on its lattice, or as they touch.
 bool are_neighbours(const AssemblyRules& rules, const Scene& scene, int first, int second);
 // Makes the blocks that are labelled with the lowest of them one body, which moves on as they did
 // in the assembly that they come from.

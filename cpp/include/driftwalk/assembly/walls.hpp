@@ -34,6 +34,16 @@ inline void spread_where(typename Numbers<Real>::Bool lanes, Member<Real>* membe
   }
 }
 
+// The axes of a block at the wall: those of its assembly, but of a rectangle its own.
+template <class T, class Real>
+inline Axes<Real> axes_at_wall(const T&, const Axes<Real>& axes, const Member<Real>&) {
+  return axes;
+}
+template <class T, class Real>
+inline Axes<Real> axes_at_wall(const Box<T>&, const Axes<Real>& axes, const Member<Real>& m) {
+  return turned_axes(axes, m.turn);
+}
+
 // Moves an assembly inward by a corner's depth, in the given lanes alone and where it is beyond the
 // tolerance; returns where that was.
 template <class Real, class T>
@@ -109,7 +119,8 @@ inline void take_back_jammed(const WallView<T>& wall, Half h, typename Numbers<R
   for (int b = 0; b < blocks; ++b) {
     Pose<Real> pushed = members[b].pose;
     const auto outside =
-        push_member<Real, T>(wall, h, tolerance, lanes, members[b].axes, members[b].arm, pushed);
+        push_member<Real, T>(wall, h, tolerance, lanes,
+                             axes_at_wall(h, members[b].axes, members[b]), members[b].arm, pushed);
     for (int lane = 0; lane < Numbers<Real>::lanes && any(outside); ++lane) {
       if (lane_of(outside, lane)) {
         take_back(members, blocks, b, lane);
@@ -129,7 +140,8 @@ inline void push_members_inside(const WallView<T>& wall, Half h, typename Number
     auto moved = Real(T(0)) > Real(T(0));
     for (int b = 0; b < blocks; ++b) {
       Member<Real>& m = members[b];
-      const auto outside = push_member<Real, T>(wall, h, tolerance, lanes, m.axes, m.arm, m.pose);
+      const auto outside = push_member<Real, T>(wall, h, tolerance, lanes,
+                                                axes_at_wall(h, m.axes, m), m.arm, m.pose);
       if (any(outside)) {
         spread_where(outside, members, blocks, b);
         moved = moved | outside;
@@ -143,15 +155,16 @@ inline void push_members_inside(const WallView<T>& wall, Half h, typename Number
   take_back_jammed(wall, h, lanes, members, blocks);
 }
 
-// `h` is half the side of a block, or its disc.
+// `h` is half the side of a block, its disc or its box.
 template <class Real, class T, class Half>
 inline void meet_walls(const WallView<T>& wall, Half h, Member<Real>* members, int blocks) {
   const Real zero{T(0)};
   auto in_assemblies = zero > zero;
   for (int b = 0; b < blocks; ++b) {
     Member<Real>& m = members[b];
-    const auto touched =
-        meet_wall(wall, h, m.per_inertia, m.arm, [&](Real) { return m.axes; }, m.pose, m.motion);
+    const auto touched = meet_wall(
+        wall, h, m.per_inertia, m.arm, [&](Real) { return axes_at_wall(h, m.axes, m); }, m.pose,
+        m.motion);
     if (!any(touched)) {
       continue;
     }
@@ -171,13 +184,22 @@ inline void meet_walls(const WallView<T>& wall, Half h, Member<Real>* members, i
   }
 }
 
+// Calls with half the side of a block, its disc or its box.
+template <class T, class Visit>
+inline void with_half(const BlockShape<T>& block, const BodyShape<T>& shape, const Visit& visit) {
+  if (shape.disc_radius > T(0)) {
+    visit(Disc<T>{shape.disc_radius});
+  } else if (shape.panel_count > 0) {
+    visit(Box<T>{shape.half_length, shape.half_width, shape.reach});
+  } else {
+    visit(block.half_side);
+  }
+}
+
 template <class Real, class T, class Law>
 inline void meet_walls(const Physics<Real, T, Law>& physics, Member<Real>* members, int blocks) {
-  if (physics.shape.disc_radius > T(0)) {
-    meet_walls(physics.wall, Disc<T>{physics.shape.disc_radius}, members, blocks);
-  } else {
-    meet_walls(physics.wall, physics.block.half_side, members, blocks);
-  }
+  with_half(physics.block, physics.shape,
+            [&](const auto& half) { meet_walls(physics.wall, half, members, blocks); });
 }
 
 DRIFTWALK_LANES_END

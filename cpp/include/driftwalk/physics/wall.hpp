@@ -168,7 +168,13 @@ struct Disc {
   T radius;
 };
 
-// How far a block reaches from its centre, from half its side; of a disc a little more. Rounding
+// A rectangle, of which each block of an assembly has axes of its own.
+template <class T>
+struct Box {
+  T half_length, half_width, reach;
+};
+
+// How far a block reaches from its centre, from half its side; of others a little more. Rounding
 // must not decide whether a lane that touches is looked at: that would depend on its neighbours.
 inline constexpr double reach_margin = 1.001;
 template <class T>
@@ -179,6 +185,23 @@ template <class T>
 inline T reach_of(const Disc<T>& disc) {
   return disc.radius * T(reach_margin);
 }
+template <class T>
+inline T reach_of(const Box<T>& box) {
+  return box.reach * T(reach_margin);
+}
+
+// The corner (s1, s2) of the body's frame, and that across its first or its second axis; from the
+// centre of mass.
+template <class Real, class Lever>
+inline void put_corners(Real s1, Real s2, typename Numbers<Real>::Bool flip_first,
+                        const Axes<Real>& axes, const Lever& arm, Contact<Real>& first,
+                        Contact<Real>& second) {
+  const Real f1 = select(flip_first, -s1, s1), f2 = select(flip_first, s2, -s2);
+  first.rx = arm_x(s1 * axes.cosine - s2 * axes.sine, arm);
+  first.ry = arm_y(s1 * axes.sine + s2 * axes.cosine, arm);
+  second.rx = arm_x(f1 * axes.cosine - f2 * axes.sine, arm);
+  second.ry = arm_y(f1 * axes.sine + f2 * axes.cosine, arm);
+}
 
 // The two corners that can touch, given the direction (nx, ny) of the wall seen from the block's
 // centre; from the centre of mass.
@@ -188,12 +211,15 @@ inline void leading_corners(Real nx, Real ny, T h, const Axes<Real>& axes, const
   const Real p1 = nx * axes.cosine + ny * axes.sine;
   const Real p2 = ny * axes.cosine - nx * axes.sine;
   const Real s1 = copy_sign(Real(h), p1), s2 = copy_sign(Real(h), p2);
-  const auto flip_first = abs(p1) < abs(p2);
-  const Real f1 = select(flip_first, -s1, s1), f2 = select(flip_first, s2, -s2);
-  first.rx = arm_x(s1 * axes.cosine - s2 * axes.sine, arm);
-  first.ry = arm_y(s1 * axes.sine + s2 * axes.cosine, arm);
-  second.rx = arm_x(f1 * axes.cosine - f2 * axes.sine, arm);
-  second.ry = arm_y(f1 * axes.sine + f2 * axes.cosine, arm);
+  put_corners(s1, s2, abs(p1) < abs(p2), axes, arm, first, second);
+}
+template <class Real, class T, class Lever>
+inline void leading_corners(Real nx, Real ny, const Box<T>& box, const Axes<Real>& axes,
+                            const Lever& arm, Contact<Real>& first, Contact<Real>& second) {
+  const Real p1 = nx * axes.cosine + ny * axes.sine;
+  const Real p2 = ny * axes.cosine - nx * axes.sine;
+  const Real s1 = copy_sign(Real(box.half_length), p1), s2 = copy_sign(Real(box.half_width), p2);
+  put_corners(s1, s2, p1 * s1 < p2 * s2, axes, arm, first, second);
 }
 
 // Of a disc the one point, and the one across, which is clear of the wall.

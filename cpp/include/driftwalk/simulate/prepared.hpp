@@ -49,6 +49,7 @@ struct BodyShape {
   const Corner<T>* corners; // that may touch a wall
   int corner_count;
   T disc_radius;              // [m]; 0: a body with corners
+  T half_length, half_width;  // of a rectangle, along its own x and y [m]; 0: another body
   T reach;                    // of its farthest point from the centre of mass [m]
   T turning_share;            // conductance for turning over that for moving [m^2]
   const AreaPoint<T>* points; // for means of the water's acceleration over its area

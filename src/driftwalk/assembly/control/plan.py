@@ -113,8 +113,9 @@ def check_control(modes: Modes, wanted: Wanted) -> Wanted:
     'I3+1'
     """
     blocks = modes.study.assembly.blocks
-    if modes.study.block.is_round:
-        raise InputError("control needs blocks with faces: discs have no classes of shapes")
+    if not modes.study.block.has_lattice:
+        shape = modes.study.block.shape
+        raise InputError(f"control needs blocks with faces: {shape}s have no classes of shapes")
     if not 2 <= blocks <= CONTROL_POLICY.most_blocks:
         raise InputError(
             f"control is planned for 2 to {CONTROL_POLICY.most_blocks} blocks, got {blocks}"

@@ -27,7 +27,7 @@ from driftwalk.assembly.outcomes.class_names import (
     listed_classes,
     listed_shapes,
 )
-from driftwalk.assembly.outcomes.disc_contacts import CONTACT_POLICY, disc_shape, touching
+from driftwalk.assembly.outcomes.disc_contacts import contact_pairs, disc_shape, touching
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import MOST_NAMED, all_single, moved_to_origin
@@ -136,9 +136,10 @@ def replay_contacts(
     pose: Floats,
     assembly: npt.ArrayLike,
     diameter: float,
+    width: float | None = None,
     event_kind: npt.ArrayLike | None = None,
 ) -> ReplayedEvents:
-    """Replay the events of simulated runs of discs, which have no lattice and no faces.
+    """Replay the events of simulated runs of discs or rectangles, which have no lattice.
 
     Parameters
     ----------
@@ -146,9 +147,9 @@ def replay_contacts(
         As in `replay_events`. Without kinds the contacts are those of the poses at the end, with
         them those that the events tell.
     pose : ndarray, shape (runs, blocks, 2 or more)
-        Columns x and y of the discs at the end [m].
-    diameter : float
-        Of a disc [m].
+        Columns x and y at the end [m]; of rectangles the third is theta [rad].
+    diameter, width
+        As in `driftwalk.assembly.outcomes.disc_contacts.touching`.
 
     Raises
     ------
@@ -167,9 +168,15 @@ def replay_contacts(
     end = _Lattice(np.zeros((*labels.shape, 2), np.int64), np.zeros_like(labels), labels)
     _check_arrays(events, end)
     if end.assembly.shape[1] > MOST_NAMED:
-        reach = diameter * (1.0 + CONTACT_POLICY.gap) if events.kind is None else 0.0
-        return _replay_many(events, end, lambda run: DiscWorld(pose[run], reach=reach))
-    replay = _DiscReplay(pose, events, diameter=diameter)
+        noun = "discs" if width is None else "rectangles"
+
+        def world_of(run: int) -> DiscWorld:
+            told = events.kind is not None
+            pairs = [] if told else contact_pairs(pose[run], diameter=diameter, width=width)
+            return DiscWorld(pose.shape[1], pairs, noun=noun)
+
+        return _replay_many(events, end, world_of)
+    replay = _DiscReplay(pose, events, diameter=diameter, width=width)
     for event in range(int(events.number.max(initial=0))):
         replay.apply(event, np.flatnonzero(events.number > event), events)
     _check_end(replay.lattice, end)
@@ -368,11 +375,14 @@ class _Replay:
 
 
 class _DiscReplay(_Replay):
-    """The same of discs, which stay as they lie."""
+    """The same of discs and rectangles, which stay as they lie."""
 
-    def __init__(self, pose: Floats, events: _Events, *, diameter: float) -> None:
+    def __init__(
+        self, pose: Floats, events: _Events, *, diameter: float, width: float | None
+    ) -> None:
         super().__init__(pose.shape[:2], events, chirality=None)
-        self.touch = np.array([touching(one, diameter=diameter) for one in pose])
+        self.noun = "discs" if width is None else "rectangles"
+        self.touch = np.array([touching(one, diameter=diameter, width=width) for one in pose])
         if events.kind is not None:
             self.touch[:] = False
 
@@ -395,7 +405,7 @@ class _DiscReplay(_Replay):
 
     def _shape_numbers(self, at: Integers, event: int, member: Bools) -> Integers:  # noqa: ARG002
         names = [
-            disc_shape(self.touch[run][np.ix_(own, own)])
+            disc_shape(self.touch[run][np.ix_(own, own)], noun=self.noun)
             for run, own in zip(at, member, strict=True)
         ]
         return np.array([self.shapes.number(name) for name in names], dtype=np.int64)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from driftwalk.assembly.lattice.bonds import CLOSING, JOINING, OPENING, PARTING
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, shape_order
-from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.contact_graphs import MOST_DISCS, counted_graph, graph_name
 from driftwalk.schema.shapes import (
@@ -142,17 +142,16 @@ class SquareWorld:
 
 
 class DiscWorld(SquareWorld):
-    """The same of discs, which stay as they lie.
+    """The same of discs or rectangles (`noun`), which stay as they lie.
 
-    All contacts at the end were there all along; with a reach of 0 they come from the events.
+    All contacts at the end were there all along; without pairs they come from the events.
     """
 
-    def __init__(self, places: Floats, *, reach: float) -> None:
-        from scipy.spatial import cKDTree
-
-        super().__init__(len(places), "merged")
-        self.near: list[list[int]] = [[] for _ in range(len(places))]
-        for one, other in cKDTree(places[:, :2]).query_pairs(reach):
+    def __init__(self, blocks: int, pairs: list[tuple[int, int]], *, noun: str) -> None:
+        super().__init__(blocks, "merged")
+        self.noun = noun
+        self.near: list[list[int]] = [[] for _ in range(blocks)]
+        for one, other in pairs:
             self.near[one].append(other)
             self.near[other].append(one)
 
@@ -164,13 +163,13 @@ class DiscWorld(SquareWorld):
             if max(met) == 2:
                 word = "ring" if self.joins[body] == len(members) else "chain"
                 return f"{word}{len(members)}"
-            return counted_graph(len(members), self.joins[body])
+            return counted_graph(len(members), self.joins[body], self.noun)
         place = {member: index for index, member in enumerate(members)}
         pairs = [(place[a], place[b]) for a in members for b in self.near[a] if b in place]
         return graph_name(len(members), pairs)
 
     def touch(self, block: list[int]) -> None:
-        """Note that two discs touch."""
+        """Note that two of them touch."""
         for one, other in (block, block[::-1]):
             if other not in self.near[one]:
                 self.near[one].append(other)

@@ -197,8 +197,8 @@ def block_pull(study: Study, table: MeasuredAttraction | None = None) -> BlockPu
     Raises
     ------
     InputError
-        When a magnet has no room in its block, discs have magnets, no typed face has a pole, or a
-        table cannot be read.
+        When a magnet has no room in its block, discs have magnets, rectangles any interaction, no
+        typed face has a pole, or a table cannot be read.
 
     Examples
     --------
@@ -209,6 +209,11 @@ def block_pull(study: Study, table: MeasuredAttraction | None = None) -> BlockPu
     """
     if not study.interaction.is_on:
         return None
+    if study.block.shape == "rectangle":
+        raise InputError(
+            "[interaction] has laws between squares and between discs, none between rectangles: "
+            "leave the section out, or take squares"
+        )
     mass = study.block.mass_kg * (1.0 + study.forces.added_mass_share)
     given = study.interaction
     measured = table or table_of(study)

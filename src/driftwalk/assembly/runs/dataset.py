@@ -78,7 +78,7 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
         "drag_coefficient": ("run", plan.drag_coefficient),
         "force_std": ("run", plan.force_std),
     }
-    if not plan.is_round:
+    if plan.has_lattice:
         data["event_face"] = (by_side, whole["event_face"])
         data["cell"] = ((*by_block, "axis"), whole["cell"])
         data["quarter"] = (by_block, whole["quarter"])
@@ -107,14 +107,14 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
 
 
 def replay_of(plan: Plan, arrays: Arrays) -> ReplayedEvents:
-    """Return what the events of runs of the native core did on the lattice, or among discs."""
-    if plan.is_round:
+    """Return what the events of runs of the native core did on the lattice, or without one."""
+    if not plan.has_lattice:
         return replay_contacts(
             arrays["event_count"],
             arrays["event_block"],
             pose=arrays["pose"],
             assembly=arrays["assembly"],
-            diameter=plan.study.block.side_m,
+            **plan.study.block.contact_size,
             event_kind=arrays.get("event_kind"),
         )
     return replay_events(
@@ -185,12 +185,13 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
         "latching": settings.latching,
         **(connector if settings.latching == "connector" else {}),
         **({} if (faces := settings.typed_faces) is None else {"faces": faces.words}),
-        "hidden_face_drag": "full" if plan.is_round else str(settings.hidden_face_drag),
+        "hidden_face_drag": "full" if not plan.has_lattice else str(settings.hidden_face_drag),
         "block_restitution": settings.block_restitution,
         "block_friction": settings.block_friction,
         **bond_attrs(study),
         "block_side_m": study.block.side_m,
-        **({"block_shape": "disc"} if plan.is_round else {}),
+        **({} if plan.has_lattice else {"block_shape": study.block.shape}),
+        **({} if (width := study.block.width_m) is None else {"block_width_m": width}),
         **({"glued": settings.glued} if glued_cells(settings) is not None else {}),
         "arena": study.tank.to_arena_json(),
         "force_interval_s": forces.force_interval_s,

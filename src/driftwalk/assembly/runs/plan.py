@@ -63,13 +63,13 @@ class Plan:
     """Drawn numbers of the law by their keys in the study, which has the others."""
 
     @property
-    def is_round(self) -> bool:
-        """Whether the blocks are discs: they have contacts, no faces and no lattice."""
-        return self.study.block.is_round
+    def has_lattice(self) -> bool:
+        """Whether the blocks are squares; others have contacts, no faces and no lattice."""
+        return self.study.block.has_lattice
 
     @property
     def chirality(self) -> Chirality | None:
-        """Whether mirror images are one class or two; None of discs, which have one."""
+        """Whether mirror images are one class or two; None without a lattice."""
         return chirality_of(self.study)
 
     def model(self) -> _core.Model:
@@ -97,8 +97,8 @@ class Plan:
 
 
 def chirality_of(study: Study) -> Chirality | None:
-    """Return whether mirror images are one class or two; None of discs, which have one."""
-    return None if study.block.is_round else study.assembly.chirality
+    """Return whether mirror images are one class or two; None without a lattice."""
+    return None if not study.block.has_lattice else study.assembly.chirality
 
 
 def make_plan(

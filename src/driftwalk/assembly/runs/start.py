@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.outcomes.disc_contacts import overlap_depth
 from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
@@ -33,23 +34,15 @@ def require_room(study: Study) -> None:
     InputError
         Names both areas, or the shape.
     """
-    if study.block.shape not in ("square", "disc"):
+    if study.block.shape not in ("square", "disc", "rectangle"):
         raise InputError(
-            f"squares and discs assemble, and the body is '{study.block.shape}' (`block.shape`): "
-            "start from the fit of one square block, or of a disc; squares may start glued "
+            f"squares, discs and rectangles assemble, and the body is '{study.block.shape}' "
+            "(`block.shape`): start from the fit of one of them; squares may start glued "
             "(`assembly.glued`)"
         )
     if (cells := glued_cells(study.assembly)) is not None:
         _require_glued(study, len(cells))
-    if study.block.is_round and study.assembly.latching == "connector":
-        raise InputError(
-            "connectors latch face to face, and discs have no faces: latching is 'collision' or "
-            "'none' for them (`assembly.latching`)"
-        )
-    if study.block.is_round and study.assembly.typed_faces is not None:
-        raise InputError(
-            "discs have no faces: leave out their types (`assembly.faces`), or take squares"
-        )
+    _require_faces(study)
     count, side, tank = study.assembly.blocks, study.block.side_m, study.tank
     area, room = count * study.block.area_m2, tank_area(tank)
     if area > room:
@@ -60,10 +53,24 @@ def require_room(study: Study) -> None:
         )
 
 
+def _require_faces(study: Study) -> None:
+    """Refuse what is said of the faces of bodies that latch as they lie."""
+    if study.block.has_lattice:
+        return
+    why = "discs have no faces" if study.block.is_round else "rectangles latch as they lie"
+    if study.assembly.latching == "connector":
+        raise InputError(
+            f"connectors latch face to face, and {why}: latching is 'collision' or 'none' for them "
+            "(`assembly.latching`)"
+        )
+    if study.assembly.typed_faces is not None:
+        raise InputError(f"{why}: leave out their types (`assembly.faces`), or take squares")
+
+
 def _require_glued(study: Study, cells: int) -> None:
-    """Refuse glued blocks that make up no two bodies, discs, and faces with types."""
+    """Refuse glued blocks that make up no two bodies, no squares, and faces with types."""
     rules = study.assembly
-    if study.block.is_round or rules.typed_faces is not None:
+    if not study.block.has_lattice or rules.typed_faces is not None:
         raise InputError(
             f"blocks start glued as '{rules.glued}' (`assembly.glued`) where they are squares "
             "whose faces have no types"
@@ -150,12 +157,12 @@ def _require_inside(study: Study, poses: Floats) -> None:
     if study.block.is_round:
         depth = inward_depth(study.tank, poses[..., 0], poses[..., 1]) - study.block.side_m / 2.0
     else:
-        angle = poses[..., 2, None] + np.pi * (0.25 + 0.5 * np.arange(4))
-        reach = study.block.side_m / math.sqrt(2.0)
+        x, y = study.block.body().corners.T
+        cosine, sine = np.cos(poses[..., 2, None]), np.sin(poses[..., 2, None])
         depth = inward_depth(
             study.tank,
-            poses[..., 0, None] + reach * np.cos(angle),
-            poses[..., 1, None] + reach * np.sin(angle),
+            poses[..., 0, None] + cosine * x - sine * y,
+            poses[..., 1, None] + sine * x + cosine * y,
         ).min(axis=-1)
     beyond = np.argwhere(depth < -TOUCHING_M)
     if beyond.size:
@@ -169,16 +176,17 @@ def _require_inside(study: Study, poses: Floats) -> None:
 def _require_apart(study: Study, poses: Floats) -> None:
     from scipy.spatial import cKDTree
 
-    side = study.block.side_m
+    side, width = study.block.side_m, study.block.width_m
     for run, placed in enumerate(poses):
         # What is farther apart than a diagonal does not overlap.
-        pairs = cKDTree(placed[:, :2]).query_pairs(math.sqrt(2.0) * side, output_type="ndarray")
+        diagonal = math.hypot(side, width or side)
+        pairs = cKDTree(placed[:, :2]).query_pairs(diagonal, output_type="ndarray")
         pairs = pairs[np.lexsort(pairs.T[::-1])]
         first, second = placed[pairs[:, 0]], placed[pairs[:, 1]]
         if study.block.is_round:
             depth = side - np.hypot(*(second - first)[:, :2].T)
         else:
-            depth = overlap_depth(first, second, side=side)
+            depth = overlap_depth(first, second, side=side, width=width)
         overlapping = np.flatnonzero(depth > TOUCHING_M)
         if overlapping.size:
             one, other = pairs[overlapping[0]]
@@ -186,27 +194,6 @@ def _require_apart(study: Study, poses: Floats) -> None:
                 f"start: blocks {one} and {other} of run {run} overlap by "
                 f"{depth[overlapping[0]]:.3g} m"
             )
-
-
-def overlap_depth(first: Floats, second: Floats, *, side: float) -> Floats:
-    """Return how deep squares overlap [m], negative where they are apart, shape (n,).
-
-    By the separating axes: the smallest over the four face directions.
-
-    Parameters
-    ----------
-    first, second : ndarray, shape (n, 3)
-        Poses [m, m, rad].
-    side : float
-        Side of the squares [m].
-    """
-    turn = second[:, 2] - first[:, 2]
-    reach = 0.5 * side * (1.0 + np.abs(np.cos(turn)) + np.abs(np.sin(turn)))
-    along = np.stack([first[:, 2], first[:, 2], second[:, 2], second[:, 2]])
-    along += np.array([0.0, 0.5, 0.0, 0.5])[:, None] * np.pi
-    apart = second[:, :2] - first[:, :2]
-    reached = np.abs(np.cos(along) * apart[:, 0] + np.sin(along) * apart[:, 1])
-    return np.asarray((reach - reached).min(axis=0))
 
 
 def require_cover(flow: xr.Dataset, tank: Tank) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -44,7 +45,10 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
     note = f"{count(runs, 'run')}, a position every {_interval(thin)}, to {1e3 * step:.2g} mm."
     if runs < path.sizes["run"]:
         note += f" {count(path.sizes['run'] - runs, 'more run')} in the file."
-    if path.attrs.get("block_shape") == "disc":
+    if "block_width_m" in path.attrs:
+        side = math.sqrt(4.0 / math.pi * side * float(path.attrs["block_width_m"]))
+        note += " Rectangles are drawn as discs of their area; films have their true shape."
+    if "block_shape" in path.attrs:
         thin = thin.assign(theta=thin["theta"] * np.nan)  # drawn as discs
     made = [_run(thin.isel(run=index), index, assembly, step) for index in range(runs)]
     names = {change["class"] for run in made for change in run["classes"]}

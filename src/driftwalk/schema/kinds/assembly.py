@@ -28,7 +28,7 @@ SETTINGS: Final = (
     hidden_face_drag text: drag on joined faces
     block_restitution number: of collisions
     block_friction number: of collisions
-    block_side_m number: side of a block, diameter of a disc
+    block_side_m number: side of a block, diameter of a disc, length of a rectangle
     arena
     force_interval_s number: how long a force lasts
     time_step_s number: step of the integrator

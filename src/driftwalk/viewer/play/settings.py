@@ -120,10 +120,20 @@ def knobs_for(tank: LiveTank, *, most_blocks: int) -> dict[str, Knob]:
         Whose values every range has to hold.
     most_blocks : int
         Blocks that the tank has room for.
+
+    Raises
+    ------
+    InputError
+        When the blocks are rectangles, which the page does not draw.
     """
+    if tank.study.block.shape == "rectangle":
+        raise InputError(
+            "the playground draws squares and discs, and the body is a rectangle (`block.shape`): "
+            "play with squares, or film the runs of an assembly"
+        )
     values = values_of(tank, speed=1.0)
     knobs = {knob.name: knob.reaching(values[knob.name]) for knob in KNOBS}
-    if tank.is_round:
+    if tank.study.block.is_round:
         # Discs have no faces.
         del knobs["hidden_face_drag"], knobs["faces"], knobs["magnets"]
         knobs["latching"] = replace(knobs["latching"], choices=("collision", "none"))

@@ -79,7 +79,7 @@ def frame_line(tank: LiveTank, number: int, events: Sequence[LiveEvent]) -> dict
     ]
     outcome = tank.outcome
     side = tank.study.block.side_m
-    joined = [] if tank.is_round else joined_faces(x, y, theta, assembly, side=side)
+    joined = [] if not tank.has_lattice else joined_faces(x, y, theta, assembly, side=side)
     return {
         "type": "frame",
         "frame": number,
@@ -97,7 +97,7 @@ def frame_line(tank: LiveTank, number: int, events: Sequence[LiveEvent]) -> dict
 
 def shown_angles(tank: LiveTank) -> Floats:
     """Return the orientations of the blocks [rad]; NaN of discs, which have none and no faces."""
-    return np.full(tank.blocks, np.nan) if tank.is_round else tank.theta
+    return np.full(tank.blocks, np.nan) if tank.study.block.is_round else tank.theta
 
 
 def joined_faces(

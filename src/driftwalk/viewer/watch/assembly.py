@@ -85,11 +85,11 @@ class RunningAssembly(Running):
         sound = (unit.arrays["status"].astype(np.int64) & BROKEN) == 0
         self._runs[name] += unit.stop - unit.start
         chirality, block = self._study.assembly.chirality, self._study.block
-        if block.is_round:
+        if not block.has_lattice:
             for pose, assembly in zip(
                 unit.arrays["pose"][sound], unit.arrays["assembly"][sound], strict=True
             ):
-                self._count[name][disc_class(pose, assembly, diameter=block.side_m)] += 1
+                self._count[name][disc_class(pose, assembly, **block.contact_size)] += 1
             return
         for cell, assembly in zip(
             unit.arrays["cell"][sound], unit.arrays["assembly"][sound], strict=True
