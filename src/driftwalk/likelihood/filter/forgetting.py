@@ -44,8 +44,8 @@ class Pull(NamedTuple):
     """The rest, as a share of tr(M A)."""
 
 
-def pull_of_prior(sums: Sums, added: Sums, factor: Any, step: Floats) -> Pull:
-    """Return what the pull adds at `step` from the coefficients of the sums.
+def pull_of_prior(sums: Sums, added: Sums, factor: Any, step: Floats, part: float = 1.0) -> Pull:
+    """Return what the pull adds at `step` from the coefficients of the sums, a part of it.
 
     `added` are the sums with the prior in them, `factor` the Cholesky factor of their information
     on the coefficients.
@@ -59,7 +59,8 @@ def pull_of_prior(sums: Sums, added: Sums, factor: Any, step: Floats) -> Pull:
     both = float(np.trace(lost) - np.sum(lost * lost.T))
     whole = len(lost) - float(np.trace(lost))
     return Pull(
-        float(sums.information[-1, :-1] @ away), (both - float(away @ information @ away)) / whole
+        part * float(sums.information[-1, :-1] @ away),
+        part * (both - float(away @ information @ away)) / whole,
     )
 
 
