@@ -112,13 +112,15 @@ public:
     scene_.cell_next[block] = first;
     first = block;
   }
-  bool has(int x, int y) const {
+  // The block in a cell, -1 where there is none.
+  int find(int x, int y) const {
     int b = head(x, y);
     while (b >= 0 && (scene_.block[b].cell_x != x || scene_.block[b].cell_y != y)) {
       b = scene_.cell_next[b];
     }
-    return b >= 0;
+    return b;
   }
+  bool has(int x, int y) const { return find(x, y) >= 0; }
 
 private:
   std::int32_t& head(int x, int y) const {
