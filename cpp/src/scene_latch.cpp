@@ -355,6 +355,7 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
     scene.assembly[merge.moves] = moved;
     return false;
   }
+  join_faces(rules, scene, joint);
   body.before = {body.x, body.y, body.theta, body.cosine, body.sine};
   body.touched = true;
   --scene.assemblies;
