@@ -279,6 +279,35 @@ def test_a_cycle_of_distant_magnets_goes_on_after_a_pause() -> None:
         np.testing.assert_array_equal(getattr(paused, name), getattr(whole, name))
 
 
+def test_a_bond_feels_the_force_of_a_distant_magnet_and_not_the_impulse_of_a_cycle() -> None:
+    # A pair at rest and a third block on its axis: the tension is half the difference of its pulls.
+    study = dw.Study(
+        interaction={"magnets": "5x5x2mm,1.3T"},
+        forces={
+            "drag_coefficient": 0.0, "force_std_N": 0.0,
+            "force_memory_s": 0.1, "stirring_length_m": 0.05,
+        },
+    )  # fmt: skip
+    pull, places = block_pull(study), np.array([0.0, SIDE, 0.1])
+    assert pull is not None
+    assert pull.faces is not None
+    points = pull.lever * np.exp(0.5j * np.pi * np.arange(4))
+
+    def pull_on(block: int, joined: int) -> float:
+        way = places[2] + points - (places[block] + np.delete(points, joined))[:, None]
+        return float((pull.faces(np.abs(way)) * way / np.abs(way)).sum().real)
+
+    tension = (pull_on(1, 2) - pull_on(0, 0)) / 2.0
+    for share, parts in ((0.9, True), (1.2, False)):
+        strength = {"assembly.bond_strength_N": share * tension}
+        tank = dw.LiveTank(
+            dw.apply_overrides(study, strength), dw.uniform_flow(0.0, 0.0), blocks=3,
+            start=np.stack([places, 0 * places, 0 * places], axis=1),
+        )  # fmt: skip
+        tank.advance(0.1)
+        assert [event.is_parting for event in tank.events()] == [False, True][: 1 + parts]
+
+
 def test_menisci_attract_by_the_closed_form() -> None:
     pull = block_pull(dw.Study(interaction={"capillary": "on", "meniscus_height_m": 1.5e-3}))
     assert pull is not None
