@@ -62,6 +62,24 @@ def test_every_world_sees_a_changing_flow_from_its_beginning() -> None:
             np.testing.assert_array_equal(alone[name][0], together[name][world], err_msg=name)
 
 
+@pytest.mark.parametrize("blocks", [4, 26])
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_faces_left_out_have_the_bits_of_faces_that_add_nothing(
+    precision: str, blocks: int
+) -> None:
+    # A share of the drag on hidden faces that rounding takes away has sums over all faces.
+    native = model(swirl, times=[0.0])
+    start, own_keys = random_starts(native, blocks, 80 // blocks, seed=5)
+    options: dict[str, Any] = {"steps": 800, "force": 2e-3, "precision": precision}
+    left_out, nothing = (
+        assemble(native, start, own_keys, hidden_face_drag=share, latching="collision", **options)
+        for share in ("none", 1e-30)
+    )
+    assert left_out["event_count"].sum() > 15
+    for name in ("pose", "event_step", "event_block"):
+        np.testing.assert_array_equal(left_out[name], nothing[name], err_msg=name)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
