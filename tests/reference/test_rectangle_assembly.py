@@ -277,6 +277,30 @@ def test_elastic_rectangles_keep_energy_and_momentum() -> None:
     assert lost[1] < 0.2 * lost[0] < 0.02 * 0.1 * LENGTH
 
 
+@pytest.mark.parametrize("left", [6, 4])
+def test_rectangles_that_part_or_lose_members_move_on_as_they_did(left: int) -> None:
+    case = dw.apply_overrides(study(tank=0.3, step=0.01), {"forces.force_std_N": 1e-3})
+    tank = LiveTank(case, dw.tank30_flow(), blocks=6, seed=1)
+    tank.advance(40.0)
+    assert len(set(tank.assembly)) < 3
+    tank.set(drag_coefficient=0.0, force_std=0.0, latching="none")
+    tank.advance(0.02)
+    place, moving = tank.x + 1j * tank.y, tank.vx + 1j * tank.vy
+    theta, spin = tank.theta, tank.omega
+    if left == 6:
+        tank.part()
+    else:
+        tank.set(blocks=left)
+    tank.advance(0.01)
+    label = tank.assembly.tolist()
+    alone = [b for b in range(left) if label.count(label[b]) == 1]
+    assert alone
+    gone = (tank.x + 1j * tank.y)[alone] - (place + 0.01 * moving)[alone]
+    assert np.abs(gone).max() < 1e-15
+    turned = tank.theta[alone] - (theta + 0.01 * spin)[alone]
+    assert np.abs(np.angle(np.exp(1j * turned))).max() < 1e-12
+
+
 @pytest.mark.slow
 def test_rectangles_stay_inside_and_apart_and_have_the_same_bits_alone() -> None:
     case = study(tank=0.3, step=0.01, blocks=8)
