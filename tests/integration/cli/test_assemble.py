@@ -277,7 +277,7 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
         (["--confidence", "1"], "--confidence over"),
         (["--side", "40cm"], "the block does not fit"),
         (["--body-shape", "disc:3cm", "--latching", "connector"], "discs have no faces"),
-        (["--body-shape", "rectangle:4x2cm"], "squares and discs assemble"),
+        (["--body-shape", "xx"], "squares, discs and rectangles assemble"),
         (["--faces", "N,S,N"], "the types of 4 faces, in the order +x, +y, -x, -y"),
         (["--faces", "NSNS", "--body-shape", "disc:3cm"], "leave out their types (--faces)"),
         (["--glued", "xx", "--blocks", "5"], "(--glued): give 4 blocks"),
