@@ -278,6 +278,7 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
         (["--confidence", "1"], "--confidence over"),
         (["--side", "40cm"], "the block does not fit"),
         (["--body-shape", "disc:3cm", "--latching", "connector"], "discs have no faces"),
+        (["--body-shape", "xx"], "squares, discs and rectangles assemble"),
         (["--body-shape", "rectangle:4x2cm", "--faces", "NSNS"], "rectangles latch as they lie"),
         (["--faces", "N,S,N"], "the types of 4 faces, in the order +x, +y, -x, -y"),
         (["--faces", "NSNS", "--body-shape", "disc:3cm"], "leave out their types (--faces)"),
