@@ -11,6 +11,7 @@ import numpy as np
 from driftwalk.figures.write import Figures
 from driftwalk.plot.model_check import label_checks, plot_check_ratios, plot_own_aspects
 from driftwalk.plot.parts import style
+from driftwalk.plot.parts.labels import model_words
 from driftwalk.schema.answers.model_comparison import own_score
 from driftwalk.schema.answers.parts import each
 from driftwalk.schema.check import require_kind
@@ -85,7 +86,7 @@ def pairs_figure(calibration: xr.Dataset) -> Figure:
     axes[0].set_yticks([])
     counts = calibration.attrs["estimate_from"] == "summaries"
     figure.suptitle(
-        f"{calibration.attrs['model']}: values that could have given the recording "
+        f"{model_words(calibration.attrs['model'])}: values that could have given the recording "
         "(orange: estimate)"
         + ("" if counts else "; they do not count, the estimate is the search's")
     )
@@ -110,8 +111,8 @@ def profiles_figure(calibration: xr.Dataset) -> Figure:
     for ax in axes[::across]:
         ax.set_ylabel("rise of the misfit")
     figure.suptitle(
-        f"{calibration.attrs['model']}: misfit along each parameter, the others at their best "
-        f"(grey: {confidence:.0%} level; dashed: interval)"
+        f"{model_words(calibration.attrs['model'])}: misfit along each parameter, the others at "
+        f"their best (grey: {confidence:.0%} level; dashed: interval)"
     )
     return figure
 
@@ -121,7 +122,7 @@ def quality_figure(calibration: xr.Dataset) -> Figure:
     figure, row = style.new_panels(1, 2, height_mm=72.0)
     aspects, checks = row
     held = calibration["held_out_distance"].values
-    name = str(calibration.attrs["model"])
+    name = model_words(calibration.attrs["model"])
     aspects.plot(held, np.arange(held.size), "o", ms=3.5, color=style.BLUE, label=name)
     plot_own_aspects(calibration, aspects, label="the recording's own parts")
     plot_check_ratios(calibration, checks, color=style.BLUE)
@@ -274,7 +275,7 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
     own = own_score(comparison)
     ax.axvline(own, color=style.INK, lw=0.6, ls="--", label="the recording's own parts")
     names = [
-        str(name) if walk else f"{name} ({verdict})"
+        name if walk else f"{model_words(name)} ({verdict})"
         for name, walk, verdict in zip(
             *(shown[of].values for of in ("model", "baseline", "verdict")), strict=True
         )
@@ -291,7 +292,7 @@ def _plot_aspects(comparison: xr.Dataset, ax: Axes) -> None:
     """Draw the distances of the first models in each aspect, and the recording's own."""
     place = np.arange(comparison.sizes["aspect"])
     for one, (color, marker) in _first(comparison):
-        held, name = one["held_out_distance"].values, str(one["model"].values)
+        held, name = one["held_out_distance"].values, model_words(str(one["model"].values))
         ax.plot(held, place, marker, ms=3.5, color=color, label=name)
     plot_own_aspects(comparison, ax, label="own")
     # Room for the names: points are anywhere on the left.
