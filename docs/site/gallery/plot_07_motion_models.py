@@ -27,4 +27,5 @@ for (name, title), ax in zip(names.items(), axes, strict=True):
     path = dw.simulate(model, parameters=chosen, study=dw.Study(), sample_time=times, seed=3)
     dw.plot.trajectory(path.isel(replicate=0), ax, colorbar="none")
     ax.set_title(title, loc="left")
+    ax.set_xticks((-10, 0, 10))
     ax.label_outer()

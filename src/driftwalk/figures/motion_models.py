@@ -219,7 +219,7 @@ def _figure(comparison: xr.Dataset) -> Figure:
     figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=ranking_mm + 82.0)
     grid = figure.add_gridspec(2, 2, height_ratios=(ranking_mm + 12.0, 60.0))
     parts: dict[str, tuple[Any, Callable[..., object]]] = {
-        "on blocks that none was fitted to": (grid[0, :], plot_models),
+        "held-out blocks": (grid[0, :], plot_models),
         "the same by aspect": (grid[1, 0], _plot_aspects),
         "not fitted, 20 worlds": (grid[1, 1], _plot_checks),
     }
@@ -227,6 +227,9 @@ def _figure(comparison: xr.Dataset) -> Figure:
     for ax, (_, draw) in zip(panels, parts.values(), strict=True):
         draw(comparison, ax)
     style.letter_panels(panels, list(parts))
+    # Of the colours of both panels of the second row.
+    handles, names = panels[1].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=len(names))
     return figure
 
 
@@ -284,7 +287,8 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_ylim(-0.6, place.size - 0.4)
     ax.set_xlim(left=0.0)
     ax.set_xlabel("distance, mean of D / floor over the aspects")
-    ax.legend(loc="lower left")
+    # Above: points and the line of the recording's own parts are anywhere.
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.0)
     return ax
 
 
@@ -294,10 +298,7 @@ def _plot_aspects(comparison: xr.Dataset, ax: Axes) -> None:
     for one, (color, marker) in _first(comparison):
         held, name = one["held_out_distance"].values, model_words(str(one["model"].values))
         ax.plot(held, place, marker, ms=3.5, color=color, label=name)
-    plot_own_aspects(comparison, ax, label="own")
-    # Room for the names: points are anywhere on the left.
-    ax.set_xlim(0.0, 1.6 * ax.get_xlim()[1])
-    ax.legend(loc="best")
+    plot_own_aspects(comparison, ax, label="the recording's own parts")
 
 
 def _plot_checks(comparison: xr.Dataset, ax: Axes) -> None:
