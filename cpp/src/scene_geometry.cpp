@@ -88,31 +88,6 @@ void link_members(Scene& scene, int assembly) {
   }
 }
 
-// Cells in front of faces 0 .. 3.
-constexpr int step_x[4] = {1, 0, -1, 0}, step_y[4] = {0, 1, 0, -1};
-
-void join_faces(Scene& scene, const SceneAssembly& a) {
-  LatticeTable cells(scene);
-  for (int b = a.first; b >= 0; b = scene.block[b].next) {
-    const SceneBlock& block = scene.block[b];
-    cells.clear(block.cell_x, block.cell_y);
-    for (int face = 0; face < 4; ++face) {
-      cells.clear(block.cell_x + step_x[face], block.cell_y + step_y[face]);
-    }
-  }
-  for (int b = a.first; b >= 0; b = scene.block[b].next) {
-    cells.add(b);
-  }
-  for (int b = a.first; b >= 0; b = scene.block[b].next) {
-    SceneBlock& block = scene.block[b];
-    block.joined = 0;
-    for (int face = 0; face < 4; ++face) {
-      const bool neighbour = cells.has(block.cell_x + step_x[face], block.cell_y + step_y[face]);
-      block.joined |= neighbour ? 1u << face : 0u;
-    }
-  }
-}
-
 // Of what latches as it lies, from where it is.
 void measure_places(const AssemblyRules& rules, Scene& scene, SceneAssembly& a) {
   Vec2 sum{0, 0};
@@ -134,6 +109,7 @@ void measure_places(const AssemblyRules& rules, Scene& scene, SceneAssembly& a) 
 void measure_assembly(const AssemblyRules& rules, Scene& scene, int assembly) {
   link_members(scene, assembly);
   measure_members(rules, scene, assembly);
+  join_faces(rules, scene, assembly);
 }
 
 void measure_members(const AssemblyRules& rules, Scene& scene, int assembly) {
@@ -155,7 +131,34 @@ void measure_members(const AssemblyRules& rules, Scene& scene, int assembly) {
     a.inertia += rules.inertia +
                  rules.mass * (block.offset_x * block.offset_x + block.offset_y * block.offset_y);
   }
-  join_faces(scene, a);
+}
+
+void join_faces(const AssemblyRules& rules, Scene& scene, int assembly) {
+  if (!on_lattice(rules)) {
+    return;
+  }
+  // Cells in front of faces 0 .. 3.
+  constexpr int step_x[4] = {1, 0, -1, 0}, step_y[4] = {0, 1, 0, -1};
+  const SceneAssembly& a = scene.assembly[assembly];
+  LatticeTable cells(scene);
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    const SceneBlock& block = scene.block[b];
+    cells.clear(block.cell_x, block.cell_y);
+    for (int face = 0; face < 4; ++face) {
+      cells.clear(block.cell_x + step_x[face], block.cell_y + step_y[face]);
+    }
+  }
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    cells.add(b);
+  }
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    SceneBlock& block = scene.block[b];
+    block.joined = 0;
+    for (int face = 0; face < 4; ++face) {
+      const bool neighbour = cells.has(block.cell_x + step_x[face], block.cell_y + step_y[face]);
+      block.joined |= neighbour ? 1u << face : 0u;
+    }
+  }
 }
 
 namespace {

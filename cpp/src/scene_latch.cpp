@@ -143,18 +143,70 @@ bool overlaps(const AssemblyRules& rules, const Scene& scene, int block, int oth
                        {before.cosine, before.sine}) > tolerance;
 }
 
+// The members of an assembly by the cells of its lattice, for whatever comes near them.
+class MembersByCell {
+public:
+  MembersByCell(const AssemblyRules& rules, Scene& scene, const SceneAssembly& a)
+      : cells_(scene), origin_(scene.block[a.first]), per_side_(1.0 / rules.side),
+        axis_(face_normal(a, 0)), low_x_(origin_.cell_x), high_x_(low_x_), low_y_(origin_.cell_y),
+        high_y_(low_y_) {
+    for (int b = a.first; b >= 0; b = scene.block[b].next) {
+      const SceneBlock& block = scene.block[b];
+      low_x_ = std::min(low_x_, block.cell_x);
+      high_x_ = std::max(high_x_, block.cell_x);
+      low_y_ = std::min(low_y_, block.cell_y);
+      high_y_ = std::max(high_y_, block.cell_y);
+    }
+    for (int x = low_x_; x <= high_x_; ++x) {
+      for (int y = low_y_; y <= high_y_; ++y) {
+        cells_.clear(x, y);
+      }
+    }
+    for (int b = a.first; b >= 0; b = scene.block[b].next) {
+      cells_.add(b);
+    }
+  }
+
+  // Whether the condition holds of any member closer to a place than `reach`, or hardly farther.
+  template <class Condition>
+  bool any_near(Vec2 place, double reach, const Condition& holds) const {
+    const Vec2 away = (place - Vec2{origin_.x, origin_.y}) * per_side_;
+    const double range = reach * per_side_;
+    const double x = origin_.cell_x + dot(away, axis_), y = origin_.cell_y + cross(axis_, away);
+    const int right = static_cast<int>(std::min<double>(high_x_, std::floor(x + range)));
+    const int top = static_cast<int>(std::min<double>(high_y_, std::floor(y + range)));
+    const int left = static_cast<int>(std::max<double>(low_x_, std::ceil(x - range)));
+    const int bottom = static_cast<int>(std::max<double>(low_y_, std::ceil(y - range)));
+    for (int column = left; column <= right; ++column) {
+      for (int row = bottom; row <= top; ++row) {
+        const int block = cells_.find(column, row);
+        if (block >= 0 && holds(block)) {
+          return true;
+        }
+      }
+    }
+    return false;
+  }
+
+private:
+  LatticeTable cells_;
+  const SceneBlock& origin_;
+  double per_side_;
+  Vec2 axis_;
+  int low_x_, high_x_, low_y_, high_y_;
+};
+
 // Only what may be near is looked at: assemblies within a circle, of these blocks, of these the
 // members of this one that they may touch as they are or were.
-bool is_clear_of_others(const AssemblyRules& rules, const Scene& scene, int assembly) {
+bool is_clear_of_others(const AssemblyRules& rules, Scene& scene, int assembly) {
   const SceneAssembly& a = scene.assembly[assembly];
   double farthest = 0;
-  int members = 0;
   for (int b = a.first; b >= 0; b = scene.block[b].next) {
     const SceneBlock& block = scene.block[b];
     farthest =
         std::max(farthest, block.offset_x * block.offset_x + block.offset_y * block.offset_y);
-    scene.by_cell[members++] = {block.x, block.y, assembly, b};
   }
+  const MembersByCell members(rules, scene, a);
   const double touching = 1.42 * rules.side; // a diagonal and a little more
   const double reach = std::sqrt(farthest) + touching;
   const auto square_from_middle = [&](Vec2 place) {
@@ -178,12 +230,9 @@ bool is_clear_of_others(const AssemblyRules& rules, const Scene& scene, int asse
       if (square_from_middle(is) > reach * reach && square_from_middle(was) > reach * reach) {
         continue;
       }
-      const double limit = touching + std::sqrt(dot(is - was, is - was));
-      for (const PlacedBlock* b = scene.by_cell; b < scene.by_cell + members; ++b) {
-        const Vec2 between{b->x - is.x, b->y - is.y};
-        if (dot(between, between) < limit * limit && overlaps(rules, scene, b->block, c, was)) {
-          return false;
-        }
+      if (members.any_near(is, touching + std::sqrt(dot(is - was, is - was)),
+                           [&](int b) { return overlaps(rules, scene, b, c, was); })) {
+        return false;
       }
     }
   }
@@ -306,6 +355,7 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
     scene.assembly[merge.moves] = moved;
     return false;
   }
+  join_faces(rules, scene, joint);
   body.before = {body.x, body.y, body.theta, body.cosine, body.sine};
   body.touched = true;
   --scene.assemblies;

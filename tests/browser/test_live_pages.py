@@ -325,7 +325,7 @@ def test_bodies_of_a_motion_model(
     with served("play", "--model", "active", *choices) as started:
         page = visit(f"http://127.0.0.1:{started.port}/").open(started.address)
         canvas = page.locator("canvas.tank-canvas")
-        until_tank(page, "frames", 20)
+        until_tank(page, "frames", 1)
         assert canvas.get_attribute("data-blocks") == "4"
         assert canvas.get_attribute("aria-label") == "The tank: bodies and their trails"
         early = drawn_share(pixels(canvas))

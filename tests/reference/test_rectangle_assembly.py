@@ -151,6 +151,156 @@ def test_a_latched_pair_feels_its_strips_at_their_own_places() -> None:
     assert turned == pytest.approx(torque / inertia, rel=0.02, abs=1e-3)
 
 
+@pytest.mark.parametrize("backend", ["reference", "cpu"])
+@pytest.mark.parametrize("tank", ["circle", "corners"])
+def test_a_rectangle_of_equal_sides_is_the_square_until_it_latches(tank: str, backend: Any) -> None:
+    """Eight hard ones that meet each other and the wall, whose roundings grow with each contact.
+
+    The drag of one sums over panels, that of the other over rows of strips.
+    """
+    corners = {"tank.shape": "rectangle", "tank.width_m": 0.2, "tank.height_m": 0.19}
+    cases = [
+        dw.apply_overrides(
+            study(tank=0.3, step=0.01, blocks=8, latching="none"),
+            {"block.shape": shape, "block.side_m": 0.03, "block.width_m": width,
+             "forces.force_std_N": 5.5e-4} | (corners if tank == "corners" else {}),
+        )
+        for shape, width in (("rectangle", 0.03), ("square", None))
+    ]  # fmt: skip
+    equal, square = (
+        assembly_path(one, dw.tank30_flow(), runs=range(1), duration=4.0, sample_interval=1.0,
+                      backend=backend)
+        for one in cases
+    )  # fmt: skip
+    assert equal.attrs["block_shape"] == "rectangle"
+    for name in ("x", "y"):
+        np.testing.assert_allclose(equal[name], square[name], rtol=0, atol=1e-6)
+    latching = {"assembly.latching": "collision"}
+    first = [
+        assemble(dw.apply_overrides(one, latching), dw.tank30_flow(), runs=20, duration=6.0,
+                 backend=backend)["first_contact_time"].values
+        for one in cases
+    ]  # fmt: skip
+    assert np.isfinite(first[0]).sum() > 10
+    np.testing.assert_array_equal(first[0], first[1])
+
+
+def bouncing(pose: Any, velocity: Any, *, step: float, tank: float, restitution: float) -> Any:
+    """Hard rectangles that fly without water, shape (worlds, blocks, 3)."""
+    worlds, blocks, _ = pose.shape
+    case = dw.apply_overrides(
+        study(tank=tank, step=step, blocks=blocks, latching="none", block_restitution=restitution),
+        {"forces.drag_coefficient": 0.0, "tank.wall_restitution": restitution,
+         "tank.wall_friction": 0.0, "tank.bounce_speed_m_s": 0.0},
+    )  # fmt: skip
+    start = {
+        "pose": pose, "velocity": velocity, "assembly": np.tile(np.arange(blocks), (worlds, 1)),
+        "cell": np.zeros((worlds, blocks, 2)), "quarter": np.zeros((worlds, blocks)),
+    }  # fmt: skip
+    still = dw.uniform_flow(0.0, 0.0, arena=case.tank.to_arena())
+    return dw.TankBatch(case, still, worlds=worlds, start=start, backend="reference")
+
+
+def energy_of(velocity: Any) -> Any:
+    return MASS / 2 * (velocity**2 * [1.0, 1.0, SQUARE_RADIUS]).sum(axis=(1, 2))
+
+
+@pytest.mark.parametrize("other", ["wall", "rectangle"])
+def test_a_corner_that_hits_bounces_by_the_impulse_of_rigid_bodies(other: str) -> None:
+    """Worlds go back from the moment of contact, and come to it by free flight.
+
+    A contact is found up to one step of 20 us late, when its place and the arms have changed.
+    """
+    rng = np.random.default_rng(11)
+    count, step, back, restitution, radius = 200, 2e-5, 0.004, 0.7, 0.4
+    corner = rng.choice([-0.5, 0.5], count) * LENGTH + 0.5j * WIDTH * rng.choice([-1, 1], count)
+    # The other's face, or the wall, is at x = `radius`; the corner that hits is the rightmost.
+    theta = rng.uniform(0.3, np.pi / 2 - 0.3, count) - np.pi / 2 * (corner.real * corner.imag > 0)
+    theta += np.pi * (corner.real < 0)
+    arm = corner * np.exp(1j * theta)
+    hit = radius + 1j * (rng.uniform(-0.4, 0.4, count) * WIDTH if other == "rectangle" else 0.0)
+    centre = np.stack([hit - arm, np.full(count, radius + LENGTH / 2 + 0j)])
+    velocity = rng.normal(0.0, 0.1, (2, count)) + 1j * rng.normal(0.0, 0.1, (2, count))
+    spin = rng.normal(0.0, 2.0, (2, count))
+    bodies = 1 if other == "wall" else 2
+    if other == "wall":
+        velocity[1] = spin[1] = 0.0
+    arms = np.stack([arm, hit - centre[1]])
+    closing = ((velocity + 1j * spin * arms) * [[1], [-1]]).real.sum(axis=0)
+    # Unit impulses along x, on the second forwards.
+    per_unit = 1.0 / MASS * (1.0 + arms.imag**2 / SQUARE_RADIUS)[:bodies].sum(axis=0)
+    impulse = (1.0 + restitution) * closing / per_unit
+    after = velocity + np.array([[-1.0], [1.0]]) * impulse / MASS
+    turning = spin + np.array([[1.0], [-1.0]]) * arms.imag * impulse / (MASS * SQUARE_RADIUS)
+
+    angle = np.stack([theta, np.zeros(count)]) - spin * back
+    place = centre - velocity * back
+    pose = np.stack([place.real, place.imag, angle], axis=-1).transpose(1, 0, 2)[:, :bodies]
+    moving = np.stack([velocity.real, velocity.imag, spin], axis=-1).transpose(1, 0, 2)
+    want = np.stack([after.real, after.imag, turning], axis=-1).transpose(1, 0, 2)
+    good = closing > 0.05
+    if other == "rectangle":
+        good &= overlap_depth(pose[:, 0], pose[:, 1], **SIZE) < 0
+    assert good.sum() > 50
+    tank = 2 * radius if other == "wall" else 1.2
+    batch = bouncing(pose[good], moving[good, :bodies], step=step, tank=tank,
+                     restitution=restitution)  # fmt: skip
+    batch.advance(back - step)
+    np.testing.assert_allclose(batch.state()["velocity"], moving[good, :bodies], atol=1e-12)
+    batch.advance(3 * step)
+    off = (batch.state()["velocity"] - want[good, :bodies]) * [1.0, 1.0, LENGTH]
+    assert np.abs(off).max() < 1e-3 * np.abs(want[good, :bodies, :2]).max()
+
+
+def test_elastic_rectangles_keep_energy_and_momentum() -> None:
+    """32 pairs that meet: energy and momentum to rounding, angular momentum to first order."""
+    rng = np.random.default_rng(1)
+    pose, velocity = np.zeros((2, 32, 2, 3))
+    pose[:, 1, 0], pose[:, 1, 1] = 0.08, rng.uniform(-0.02, 0.02, 32)
+    pose[..., 2] = rng.uniform(-3, 3, (32, 2))
+    velocity[:, :, 0], velocity[..., 2] = [0.1, -0.1], rng.normal(0, 3, (32, 2))
+
+    def spin_of(state: Any) -> Any:
+        (x, y, _), (u, v, omega) = state["pose"].T, state["velocity"].T
+        return (x * v - y * u + SQUARE_RADIUS * omega).sum(axis=0)
+
+    lost = []
+    for step in (1e-2, 1e-3):
+        batch = bouncing(pose, velocity, step=step, tank=0.8, restitution=1.0)
+        before = spin_of(batch.state())
+        batch.advance(1.0)
+        found = batch.state()["velocity"]
+        assert (np.abs(found - velocity).max(axis=(1, 2)) > 1e-3).all()
+        np.testing.assert_allclose(energy_of(found), energy_of(velocity), rtol=1e-12)
+        np.testing.assert_allclose(found[..., :2].sum(axis=1), 0.0, atol=1e-15)
+        lost.append(np.abs(spin_of(batch.state()) - before).max())
+    assert lost[1] < 0.2 * lost[0] < 0.02 * 0.1 * LENGTH
+
+
+@pytest.mark.parametrize("left", [6, 4])
+def test_rectangles_that_part_or_lose_members_move_on_as_they_did(left: int) -> None:
+    case = dw.apply_overrides(study(tank=0.3, step=0.01), {"forces.force_std_N": 1e-3})
+    tank = LiveTank(case, dw.tank30_flow(), blocks=6, seed=1)
+    tank.advance(40.0)
+    assert len(set(tank.assembly)) < 3
+    tank.set(drag_coefficient=0.0, force_std=0.0, latching="none")
+    tank.advance(0.02)
+    place, moving = tank.x + 1j * tank.y, tank.vx + 1j * tank.vy
+    theta, spin = tank.theta, tank.omega
+    if left == 6:
+        tank.part()
+    else:
+        tank.set(blocks=left)
+    tank.advance(0.01)
+    label = tank.assembly.tolist()
+    alone = [b for b in range(left) if label.count(label[b]) == 1]
+    assert alone
+    gone = (tank.x + 1j * tank.y)[alone] - (place + 0.01 * moving)[alone]
+    assert np.abs(gone).max() < 1e-15
+    turned = tank.theta[alone] - (theta + 0.01 * spin)[alone]
+    assert np.abs(np.angle(np.exp(1j * turned))).max() < 1e-12
+
+
 @pytest.mark.slow
 def test_rectangles_stay_inside_and_apart_and_have_the_same_bits_alone() -> None:
     case = study(tank=0.3, step=0.01, blocks=8)

@@ -263,6 +263,7 @@ const replay = object({
   ...base,
   arena: nullable(arena),
   side: number,
+  width: nullable(number),
   time: numbers,
   runs: list(
     object({
@@ -316,6 +317,7 @@ const tank = object({
   ...base,
   arena: nullable(arena),
   side: number,
+  width: nullable(number),
   flow: nullable(arrows),
   /** Bodies without a shape of their own are dots. */
   shape: withDefault(text, "square"),

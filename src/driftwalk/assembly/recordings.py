@@ -111,8 +111,8 @@ def classify(
     Raises
     ------
     InputError
-        When there is no sample, a body has no orientation, no two bodies are ever seen in the same
-        sample, or a tolerance is out of range.
+        When there is no sample, the recording states that its bodies are no squares, a body has no
+        orientation, no two bodies are ever seen in the same sample, or a tolerance is out of range.
 
     Notes
     -----
@@ -153,6 +153,11 @@ def _checked_poses(recording: xr.Dataset) -> Poses:
         raise InputError("the recording has no body: there is nothing to classify")
     if not recording.sizes["time"]:
         raise InputError("the recording has no sample: there is nothing to classify")
+    if (shape := recording.attrs.get("block_shape", "square")) != "square":
+        raise InputError(
+            f"the shape of the bodies is '{shape}', and only squares are classified, by their "
+            "faces: what simulated ones built is in the result of driftwalk assemble"
+        )
     poses = Poses(*(recording[name].values for name in ("time", "x", "y", "theta")))
     blind = [name for index, name in enumerate(names) if not poses.seen[:, index].any()]
     if len(blind) == len(names):

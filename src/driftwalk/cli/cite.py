@@ -107,8 +107,13 @@ def _model(specification: Mapping[str, Any], manifest: Mapping[str, Any]) -> str
     if isinstance(models, list):
         names = [str(_mapping(one).get("name", "of a user")) for one in models]
         return f"models {', '.join(names)}"
-    side = _mapping(_mapping(manifest.get("study")).get("block")).get("side_m")
-    return f"the block of the paper, {side:g} m wide" if isinstance(side, float) else "the block"
+    block = _mapping(_mapping(manifest.get("study")).get("block"))
+    sides = [
+        f"{block[key]:g}" for key in ("side_m", "width_m") if isinstance(block.get(key), float)
+    ]
+    if (shape := block.get("shape", "square")) != "square":
+        return f"a body of shape '{shape}' in the model of the paper, {' x '.join(sides)} m"
+    return f"the block of the paper, {sides[0]} m wide" if sides else "the block"
 
 
 def _inputs(manifest: Mapping[str, Any]) -> list[str]:

@@ -221,8 +221,7 @@ def plot_predicted_shares(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set(xlabel=TIME_LABEL, ylabel="share of runs", xlim=(time[0], time[-1]), ylim=(0.0, None))
     ax.legend(ncols=2)
     ax.spines[["top", "right"]].set_visible(False)
-    points = " and ".join(
-        f"{marker} {name}" for marker, name in zip("●×", kinetics["source"].values, strict=False)
-    )
+    both = [f"{marker} {one}" for marker, one in zip("●×", kinetics["source"].values, strict=False)]
+    points = " and ".join(both) if len(both) > 1 else "points"
     ax.set_title(f"predicted (lines), seen ({points})", loc="left")
     return ax

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-
 BINS = 48
 """Bins of each axis of the joint posterior; chosen by hand."""
 

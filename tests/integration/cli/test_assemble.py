@@ -157,16 +157,17 @@ def test_from_a_flow_field(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_discs_assemble_and_have_a_page(tmp_path: Path) -> None:
-    words = ["--flow", FLOW, "--body-shape", "disc:4cm", "--mass", "24g", *SIZE]
-    done = here("assemble", *words, "--json", "-o", tmp_path / "discs")
+@pytest.mark.parametrize("shape", ["disc:4cm", "rectangle:4x2cm"])
+def test_what_latches_as_it_lies_assembles_and_has_a_page(shape: str, tmp_path: Path) -> None:
+    words = ["--flow", FLOW, "--body-shape", shape, "--mass", "24g", *SIZE]
+    done = here("assemble", *words, "--json", "-o", tmp_path / "run")
     assert done.code == 0, done.err
     printed = json.loads(done.out)
     assert printed["hidden_face_drag"] == "full"
     classes = set(printed["proportions"])
     assert classes & {"chain3", "chain4", "chain3+1", "star4"}
     assert not classes & {"I", "L3", "T", "L3+1"}
-    assert here("report", tmp_path / "discs", "-o", tmp_path / "page.html").code == 0
+    assert here("report", tmp_path / "run", "-o", tmp_path / "page.html").code == 0
 
 
 @pytest.mark.slow
@@ -277,7 +278,8 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
         (["--confidence", "1"], "--confidence over"),
         (["--side", "40cm"], "the block does not fit"),
         (["--body-shape", "disc:3cm", "--latching", "connector"], "discs have no faces"),
-        (["--body-shape", "rectangle:4x2cm"], "squares and discs assemble"),
+        (["--body-shape", "xx"], "squares, discs and rectangles assemble"),
+        (["--body-shape", "rectangle:4x2cm", "--faces", "NSNS"], "rectangles latch as they lie"),
         (["--faces", "N,S,N"], "the types of 4 faces, in the order +x, +y, -x, -y"),
         (["--faces", "NSNS", "--body-shape", "disc:3cm"], "leave out their types (--faces)"),
         (["--glued", "xx", "--blocks", "5"], "(--glued): give 4 blocks"),

@@ -175,6 +175,25 @@ def test_blocks_that_assemble_go_out_by_run(blocks: Path, tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kind", ["path", "simulation"])
+def test_rectangles_keep_shape_and_size_and_are_not_classified(kind: str, tmp_path: Path) -> None:
+    raft = dw.Study(block={"shape": "rectangle", "side_m": 0.04, "width_m": 0.02})
+    simulated = (
+        dw.assembly_path(raft, dw.tank30_flow(), duration=1.0)
+        if kind == "path"
+        else dw.simulate(raft, dw.tank30_flow(), sample_time=[0.0, 0.1])
+    )
+    (tmp_path / "raft.nc").write_bytes(netcdf_bytes(simulated))
+    done = here("export", tmp_path / "raft.nc", "--to", "movement", "-o", tmp_path / "out")
+    assert done.code == 0, done.err
+    back = load(next((tmp_path / "out").glob("*.nc")))
+    found = {name: back.attrs[f"block_{name}"] for name in ("shape", "side_m", "width_m")}
+    assert found == {"shape": "rectangle", "side_m": 0.04, "width_m": 0.02}
+    if kind == "path":
+        line = refusal(here("classify", tmp_path / "raft.nc"))
+        assert "the shape of the bodies is 'rectangle', and only squares are classified" in line
+
+
 def test_a_film_shows_the_first_of_several_runs_and_says_so(blocks: Path, tmp_path: Path) -> None:
     done = here("export", blocks, "--to", "gif", "--speed", "5", "-o", tmp_path / "out")
     assert done.code == 0, done.err

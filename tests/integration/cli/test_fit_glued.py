@@ -39,7 +39,7 @@ def test_a_dimer_tells_hidden_drag_and_shared_stirring(tmp_path: Path) -> None:
     assert again["stirring_length_quantile"].values[[0, -1]] == pytest.approx(LENGTH, rel=0.6)
     refused = here("assemble", dimer, "-o", tmp_path / "five")
     assert refused.code == 2
-    assert "squares and discs assemble, and the body is 'xx'" in refused.err
+    assert "squares, discs and rectangles assemble, and the body is 'xx'" in refused.err
 
 
 def test_shares_of_hidden_drag_and_lengths_are_axes(tmp_path: Path) -> None:

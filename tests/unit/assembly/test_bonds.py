@@ -279,13 +279,15 @@ def test_classify_reads_joinings_and_partings_of_a_simulated_recording() -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", ["square", "disc"])
+@pytest.mark.parametrize("shape", ["square", "disc", "rectangle"])
 def test_many_blocks_part_as_few_do(shape: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # Worlds of more than 64 blocks are replayed by other code: it gives the same for fewer.
     from driftwalk.assembly.lattice import events
 
     rule = dw.Study(
-        tank={"diameter_m": 0.25}, block={"shape": shape}, assembly={"bond_rate_per_s": 0.2}
+        tank={"diameter_m": 0.25},
+        block={"shape": shape} | ({"width_m": 0.02} if shape == "rectangle" else {}),
+        assembly={"bond_rate_per_s": 0.2},
     )
     flow = dw.vortex_flow(angular_velocity=0.6, core_radius=0.04, arena=rule.tank.to_arena())
     few = dw.assemble(rule, flow, blocks=12, runs=3, duration=30.0)

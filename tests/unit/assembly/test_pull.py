@@ -267,6 +267,49 @@ def test_distant_magnets_that_wait_keep_energy_and_momentum() -> None:
     assert np.ptp(totals) < 1e-3 * max(kinetics)
 
 
+def test_pairs_that_fly_at_each_other_come_back_with_their_energy() -> None:
+    # Like poles, from beyond the cut-off to where the near share of the force acts, and back.
+    worlds, rng = 24, np.random.default_rng(2)
+    pose, velocity = np.zeros((2, worlds, 2, 3))
+    pose[:, :, 0], pose[:, 1, 1] = [-0.09, 0.09], rng.uniform(-0.02, 0.02, worlds)
+    pose[..., 2] = rng.uniform(-3, 3, (worlds, 2))
+    velocity[:, :, 0], velocity[..., 2] = [0.12, -0.12], rng.normal(0, 1, (worlds, 2))
+    study = dw.Study(
+        tank={"diameter_m": 0.6}, forces={"drag_coefficient": 0.0, "force_std_N": 0.0},
+        interaction={"magnets": "5x5x2mm,1.3T"}, simulation={"time_step_s": 5e-3},
+        assembly={"faces": "N,N,N,N", "latching": "none", "blocks": 2},
+    )  # fmt: skip
+    start = {
+        "pose": pose, "velocity": velocity, "assembly": np.tile([0, 1], (worlds, 1)),
+        "cell": np.zeros((worlds, 2, 2)), "quarter": np.zeros((worlds, 2)),
+    }  # fmt: skip
+    still, pull = dw.uniform_flow(0.0, 0.0, arena=study.tank.to_arena()), block_pull(study)
+    batch = dw.TankBatch(study, still, worlds=worlds, start=start, backend="reference")
+    assert pull is not None
+
+    def sums() -> tuple[Any, Any]:
+        (x, y, _), (u, v, omega) = batch.state()["pose"].T, batch.state()["velocity"].T
+        spin = x * v - y * u + SIDE**2 / 6 * omega
+        kept = np.array([u.sum(axis=0), v.sum(axis=0), spin.sum(axis=0)])
+        return (u**2 + v**2 + SIDE**2 / 6 * omega**2).sum(axis=0), kept
+
+    def apart() -> Any:
+        x, y, theta = batch.state()["pose"].T[..., None]
+        face = x + 1j * y + pull.lever * np.exp(1j * (theta + np.pi / 2 * np.arange(4)))
+        return np.abs(face[0][:, None] - face[1][..., None]).min(axis=(1, 2))
+
+    energy, kept = sums()
+    nearest = apart()
+    for _ in range(40):
+        batch.advance(0.06)
+        nearest = np.minimum(nearest, apart())
+    assert (nearest**2 < pull.tables.stepping.near_end).mean() > 0.7
+    assert apart().min() + 2 * pull.lever > pull.tables.reach
+    after, kept_after = sums()
+    np.testing.assert_allclose(after, energy, rtol=3e-3)
+    np.testing.assert_allclose(kept_after, kept, rtol=0, atol=1e-14)
+
+
 def test_a_cycle_of_distant_magnets_goes_on_after_a_pause() -> None:
     pair = still_pair(
         [[0.0, 0.0, 0.2], [0.07, 0.01, -0.3]], interaction={"magnets": "5x5x2mm,1.3T"}
@@ -277,6 +320,35 @@ def test_a_cycle_of_distant_magnets_goes_on_after_a_pause() -> None:
     whole.advance(0.11)
     for name in ("x", "y", "theta", "vx"):
         np.testing.assert_array_equal(getattr(paused, name), getattr(whole, name))
+
+
+def test_a_bond_feels_the_force_of_a_distant_magnet_and_not_the_impulse_of_a_cycle() -> None:
+    # A pair at rest and a third block on its axis: the tension is half the difference of its pulls.
+    study = dw.Study(
+        interaction={"magnets": "5x5x2mm,1.3T"},
+        forces={
+            "drag_coefficient": 0.0, "force_std_N": 0.0,
+            "force_memory_s": 0.1, "stirring_length_m": 0.05,
+        },
+    )  # fmt: skip
+    pull, places = block_pull(study), np.array([0.0, SIDE, 0.1])
+    assert pull is not None
+    assert pull.faces is not None
+    points = pull.lever * np.exp(0.5j * np.pi * np.arange(4))
+
+    def pull_on(block: int, joined: int) -> float:
+        way = places[2] + points - (places[block] + np.delete(points, joined))[:, None]
+        return float((pull.faces(np.abs(way)) * way / np.abs(way)).sum().real)
+
+    tension = (pull_on(1, 2) - pull_on(0, 0)) / 2.0
+    for share, parts in ((0.9, True), (1.2, False)):
+        strength = {"assembly.bond_strength_N": share * tension}
+        tank = dw.LiveTank(
+            dw.apply_overrides(study, strength), dw.uniform_flow(0.0, 0.0), blocks=3,
+            start=np.stack([places, 0 * places, 0 * places], axis=1),
+        )  # fmt: skip
+        tank.advance(0.1)
+        assert [event.is_parting for event in tank.events()] == [False, True][: 1 + parts]
 
 
 def test_menisci_attract_by_the_closed_form() -> None:

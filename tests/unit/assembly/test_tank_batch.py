@@ -16,6 +16,7 @@ from driftwalk.core.errors import InputError
 
 STILL = dw.uniform_flow(0.0, 0.0)
 FORCES: dict[str, Any] = {"force_std_N": 2e-3, "force_interval_s": 0.02}
+AS_THEY_LIE = ("discs", "rectangles")
 STUDIES: dict[str, dict[str, Any]] = {
     "paper": {},
     "law": {"forces": BEYOND_PAPER["all"]},
@@ -25,6 +26,9 @@ STUDIES: dict[str, dict[str, Any]] = {
     "faces": {"assembly": {"faces": "N,S,N,S"}},
     "magnets": {"interaction": {"magnets": "5x5x2mm,1.3T"}},
     "discs": {"block": {"shape": "disc", "side_m": 0.03, "mass_kg": 0.0116}},
+    "rectangles": {
+        "block": {"shape": "rectangle", "side_m": 0.04, "width_m": 0.02, "mass_kg": 0.0116}
+    },
     "rectangle": {
         "tank": {"shape": "rectangle", "diameter_m": None, "width_m": 0.2, "height_m": 0.15}
     },
@@ -72,8 +76,8 @@ def changes(k: int, latchings: tuple[str, ...]) -> dict[str, Any]:
 def test_the_reference_has_the_bits_of_a_live_tank(name: str) -> None:
     study = study_of("paper" if name == "series" else name)
     flow = series(study) if name == "series" else swirl(study)
-    round_or_typed = name in ("discs", "faces", "magnets")
-    latchings = ("none", "collision") if round_or_typed else ("connector", "none", "collision")
+    collide = name in (*AS_THEY_LIE, "faces", "magnets")
+    latchings = ("none", "collision") if collide else ("connector", "none", "collision")
     joined = 0
     for seed in range(2):
         tank = dw.LiveTank(study, flow, seed=seed)
@@ -114,7 +118,7 @@ def test_worlds_are_those_of_assembly_path(name: str) -> None:
 
 
 @pytest.mark.parametrize("backend", ["cpu", "reference"])
-@pytest.mark.parametrize("name", ["paper", "law", "discs"])
+@pytest.mark.parametrize("name", ["paper", "law", "discs", "rectangles", "magnets"])
 def test_no_world_depends_on_the_others_or_on_the_threads(name: str, backend: Any) -> None:
     """40 worlds in two flows and all ways of latching, and each of them alone."""
     study = study_of(name)
@@ -131,7 +135,7 @@ def test_no_world_depends_on_the_others_or_on_the_threads(name: str, backend: An
             batch.advance(0.53)
         return batch.state() | {"since": batch.class_since, "outcome": batch.outcome}
 
-    latchings = ["none", "collision"] + (["connector"] if name != "discs" else [])
+    latchings = ["none", "collision"] + (["connector"] if name not in AS_THEY_LIE else [])
     settings = [
         {
             "flow": generator.integers(0, 2, 40),
@@ -172,7 +176,7 @@ def test_copies_go_on_as_the_worlds_do_with_the_same_forces(backend: Any) -> Non
     assert all(np.array_equal(again.state()[part], v) for part, v in batch.state().items())
 
 
-@pytest.mark.parametrize("name", ["paper", "faces", "discs"])
+@pytest.mark.parametrize("name", ["paper", "faces", *AS_THEY_LIE])
 def test_a_joined_start_goes_on_as_it_moves(name: str) -> None:
     """In still water and without forces two batches differ by the drag before the start alone."""
     study = study_of(name)

@@ -188,6 +188,17 @@ def test_the_replay_has_the_poses_and_what_joined_when(sections: list[dict[str, 
         assert run["classes"][-1] == {"time": times[-1], "class": "I"}
 
 
+def test_the_replay_of_rectangles_has_their_sides_and_of_discs_no_headings() -> None:
+    path = assembly_path().assign_attrs(block_shape="rectangle", block_width_m=0.02)
+    part = part_of(assembly_sections(path=path), "replay")
+    assert (part["side"], part["width"]) == (0.03, 0.02)
+    assert np.isfinite(values(part["runs"][0]["theta"])).all()
+    path = assembly_path().assign_attrs(block_shape="disc")
+    part = part_of(assembly_sections(path=path), "replay")
+    assert part["width"] is None
+    assert np.isnan(values(part["runs"][0]["theta"])).all()
+
+
 def test_a_run_has_the_number_by_which_it_is_asked_for() -> None:
     path = assembly_path().isel(run=slice(1, 2)).assign_coords(run=[7])
     (run,) = part_of(assembly_sections(path=path), "replay")["runs"]

@@ -59,21 +59,28 @@ def test_values_that_a_knob_takes(name: str, value: Any, read: Any) -> None:
     assert (found, type(found)) == (read, type(read))
 
 
-def test_a_tank_of_discs_has_no_faces_and_no_headings() -> None:
-    study = dw.apply_overrides(Study(), {"block.shape": "disc:4cm", "block.mass_kg": 0.024})
+@pytest.mark.parametrize("shape", ["disc:4cm", "rectangle:4x2cm"])
+def test_what_latches_as_it_lies_has_no_faces_and_a_disc_no_heading(shape: str) -> None:
+    study = dw.apply_overrides(Study(), {"block.shape": shape, "block.mass_kg": 0.024})
     source = PlaySource(study, dw.tank30_flow(), blocks=6)
     message = source.greeting()[0]
+    tank = message["page"]["sections"][0]
+    size = (0.04, None if study.block.is_round else 0.02)
+    assert (tank["side"], tank["width"]) == size
+    hello = hello_line(source.tank)
+    assert (hello["block_side_m"], hello["block_width_m"]) == size
     source.tank.advance(60.0)
     controls = next(one for one in message["page"]["sections"] if one["kind"] == "controls")
     items = {item["name"]: item for item in controls["items"]}
-    assert "hidden_face_drag" not in items
+    assert not {"hidden_face_drag", "faces", "magnets"} & set(items)
     assert items["latching"]["choices"] == ["collision", "none"]
     now = source._tank_message()
-    assert now["theta"] == [None] * 6
+    turned = [None] * 6 if study.block.is_round else np.round(source.tank.theta, 4).tolist()
+    assert now["theta"] == turned
     assert now["outcome"] == source.tank.outcome
     line = frame_line(source.tank, 0, source.tank.events())
-    assert line["joined"] == []
-    assert {body["theta_rad"] for body in line["bodies"]} == {None}
+    assert line["joined"] is None
+    assert [body["theta_rad"] is None for body in line["bodies"]] == [study.block.is_round] * 6
     assert line["events"][-1]["outcome"] == source.tank.outcome
     json.dumps(line, allow_nan=False)
 

@@ -41,6 +41,13 @@ CHANGES = (
     Move(2.0, {"bond_rate": 0.3, "magnets": "none"}),
     Move(1.0, {"blocks": 3, "bond_rate": 0.0}),
 )
+RECTANGLES = (
+    Move(10.0),
+    Move(4.0, {"blocks": 8, "drag_coefficient": 0.55, "stirring_length": 0.06}),
+    Move(3.0, {"bond_rate": 0.3}),
+    Move(2.0, {"blocks": 5, "bond_rate": 0.0}),
+    Move(1.0, {"latching": "none"}, part=True),
+)
 
 
 def study(**assembly: Any) -> dw.Study:
@@ -73,25 +80,15 @@ def test_half_a_minute_of_four_blocks_has_the_bits_of_the_native_core() -> None:
             ),
             [Move(4.0)],
         ),
+        (dw.apply_overrides(study(), {"block.shape": "disc"}), [Move(10.0)]),
+        (dw.apply_overrides(study(), {"block.shape": "rectangle:4x2cm"}), RECTANGLES),
     ],
-    ids=["changes", "connectors", "many", "rectangle"],
+    ids=["changes", "connectors", "many", "tank with sides", "discs", "rectangles"],
 )
 def test_every_knob_has_the_bits_of_the_native_core(chosen: dw.Study, moves: list[Move]) -> None:
     flow = tank30_flow()
     found = in_node(TRACE, moved_in_browser(PlaySource(chosen, flow), moves))
     require_same_bits(dw.LiveTank(chosen, flow), moves, found)
-
-
-@pytest.mark.slow
-def test_discs_have_the_bits_of_the_native_core_and_the_sizes_of_their_assemblies() -> None:
-    discs = dw.apply_overrides(study(), {"block.shape": "disc"})
-    found = in_node(TRACE, moved_in_browser(PlaySource(discs, tank30_flow()), [Move(10.0)]))
-    tank = dw.LiveTank(discs, tank30_flow())
-    tank.advance(10.0)
-    pose = np.stack([tank.x, tank.y, tank.theta], axis=1)
-    np.testing.assert_array_equal(numbers_of(found[0]["pose"]), pose.ravel())
-    sizes = sorted(np.unique(tank.assembly, return_counts=True)[1].tolist(), reverse=True)
-    assert found[0]["outcome"] == "+".join(map(str, sizes))
 
 
 @pytest.mark.slow

@@ -1,6 +1,6 @@
 /** What a saved playground holds of its tank (src/driftwalk/viewer/play/saved.py), made ready for the core. */
 
-import { type Checked, anything, flag, list, nullable, number, object, record, text } from "../check";
+import { type Checked, anything, list, nullable, number, object, oneOf, record, text } from "../check";
 import { type Address, type Core, doubles } from "./core";
 
 const motion = object({
@@ -29,7 +29,7 @@ export const checkLocal = object({
   rules: record(number),
   choices: record(record(anything)),
   chirality: text,
-  round: flag,
+  shape: oneOf("square", "disc", "rectangle"),
   most_named: number,
   run_steps: number,
   motion,

@@ -146,7 +146,7 @@ class Moving {
 
   private show(): void {
     const { tank } = this;
-    const { round, most_named: most } = tank.model.local;
+    const { shape, most_named: most } = tank.model.local;
     const state = tank.read();
     const outcome = tank.outcome(state);
     this.publish({
@@ -155,12 +155,14 @@ class Moving {
       speed: this.paceNow(),
       paused: this.paused,
       ...this.places(),
-      theta: Array.from(tank.read().assembly, (_, block) => (round ? null : (state.pose[3 * block + 2] ?? null))),
+      theta: Array.from(tank.read().assembly, (_, block) =>
+        shape === "disc" ? null : (state.pose[3 * block + 2] ?? null),
+      ),
       assembly: Array.from(state.assembly),
       poles: tank.poles(state),
       waiting: tank.waiting,
       outcome,
-      counts: Object.fromEntries(shapeCounts(state, outcome, round ? 0 : most)),
+      counts: Object.fromEntries(shapeCounts(state, outcome, shape === "square" ? most : 0)),
       seed: this.seed,
     });
   }

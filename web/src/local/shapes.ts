@@ -83,7 +83,7 @@ export function className(state: Joined, merged: boolean, most: number): string 
   return names.sort(before).join("+");
 }
 
-/** Returns the sizes of the assemblies of discs. */
+/** Returns the sizes of the assemblies of discs or rectangles. */
 export function sizesName(state: Joined): string {
   const sizes = members(state).map((group) => group.length);
   return sizes.sort((one, other) => other - one).join("+");

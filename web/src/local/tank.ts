@@ -153,10 +153,10 @@ export class LocalTank {
     };
   }
 
-  /** Outcome class of the world, as `assemble` names it; of discs the sizes of their assemblies. */
+  /** Outcome class of the world, as `assemble` names it; of discs and rectangles the sizes of their assemblies. */
   outcome(state: State): string {
-    const { round, chirality, most_named: most } = this.model.local;
-    return round ? sizesName(state) : className(state, chirality === "merged", most);
+    const { shape, chirality, most_named: most } = this.model.local;
+    return shape === "square" ? className(state, chirality === "merged", most) : sizesName(state);
   }
 
   /** Poles of the blocks' faces; no rows where faces have no types. */

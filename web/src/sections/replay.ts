@@ -106,7 +106,8 @@ class Player {
     this.root = el("div", { class: "replay", "data-part": "replay" }, canvas, beside);
     body.append(this.root);
     this.tank = new TankCanvas(canvas, "Blocks in the tank, coloured by assembly");
-    this.tank.setTank(section.arena, section.side, boxAround(section.arena, this.run.x, this.run.y));
+    const box = boxAround(section.arena, this.run.x, this.run.y);
+    this.tank.setTank(section.arena, [section.side, section.width], box);
     beside.append(this.controls(), this.outcome);
     this.addStrip(beside, section.cells);
     this.useKeys(canvas);

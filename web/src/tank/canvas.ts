@@ -31,6 +31,9 @@ export interface Blocks {
   readonly poles?: readonly (readonly number[])[];
 }
 
+/** Side of a square, or diameter of a disc [m]; of a rectangle its length and its width. */
+export type Size = readonly [side: number, width: number | null];
+
 export interface Trail {
   readonly x: readonly number[];
   readonly y: readonly number[];
@@ -63,7 +66,7 @@ export class TankCanvas {
   private readonly holder: HTMLElement;
   private readonly still: HTMLCanvasElement = document.createElement("canvas");
   private arena: Arena | null = null;
-  private side = 0;
+  private size: Size = [0, null];
   private box: Box = boxAround(null);
   private arrows: FlowArrows | null = null;
   private scene: Scene = { blocks: null };
@@ -82,10 +85,10 @@ export class TankCanvas {
     });
   }
 
-  /** Sets what does not move: the tank and the size of its blocks [m]. */
-  setTank(arena: Arena | null, side: number, box?: Box): void {
+  /** Sets what does not move: the tank and the size of its blocks. */
+  setTank(arena: Arena | null, size: Size, box?: Box): void {
     this.arena = arena;
-    this.side = side;
+    this.size = size;
     this.box = box ?? boxAround(arena);
     this.resize();
   }
@@ -108,7 +111,7 @@ export class TankCanvas {
     } else context.drawImage(this.still, 0, 0);
     for (const trail of scene.trails ?? []) drawTrail(view, trail);
     const over = scene.under !== undefined && scene.under !== null;
-    if (scene.blocks !== null) drawBlocks(view, scene.blocks, this.side, over ? SEE_THROUGH : 1);
+    if (scene.blocks !== null) drawBlocks(view, scene.blocks, this.size, over ? SEE_THROUGH : 1);
     this.frames += 1;
     this.element.dataset["frames"] = String(this.frames);
   }
@@ -278,9 +281,10 @@ function drawTrail(view: View, trail: Trail): void {
   context.globalAlpha = 1;
 }
 
-function drawBlocks(view: View, blocks: Blocks, side: number, opacity: number): void {
+function drawBlocks(view: View, blocks: Blocks, [side, width]: Size, opacity: number): void {
   const { context } = view;
   const half = Math.max((side * view.zoom) / 2, 3 * fineness());
+  const across = half * (width === null ? 1 : width / side);
   context.lineWidth = Math.min(fineness() * 1.2, 0.22 * half);
   const ink = styleColour("ink");
   for (let index = 0; index < blocks.x.length; index += 1) {
@@ -292,7 +296,7 @@ function drawBlocks(view: View, blocks: Blocks, side: number, opacity: number): 
     // Angles are counter-clockwise, rows of pixels go down.
     context.rotate(Number.isFinite(theta) ? -theta : 0);
     context.beginPath();
-    if (Number.isFinite(theta)) context.rect(-half, -half, 2 * half, 2 * half);
+    if (Number.isFinite(theta)) context.rect(-half, -across, 2 * half, 2 * across);
     else context.arc(0, 0, half, 0, 2 * Math.PI);
     const colour = blocks.colours[index] ?? ink;
     if (blocks.hidden?.[index] === true) {
@@ -311,7 +315,7 @@ function drawBlocks(view: View, blocks: Blocks, side: number, opacity: number): 
     }
     context.restore();
     const name = blocks.names?.[index];
-    if (name !== undefined && half > 7) drawName(context, name, x, y, half, ink);
+    if (name !== undefined && half > 7) drawName(context, name, x, y, Math.min(half, across), ink);
   }
 }
 

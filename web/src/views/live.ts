@@ -154,7 +154,7 @@ class LiveStream {
     this.seenEvents.clear();
     this.video.disabled = this.camera === null;
     const box = hello.tank === null && this.camera !== null ? imageBox(this.camera) : boxAround(hello.tank);
-    this.tank.setTank(hello.tank, hello.block_side_m ?? 0, box);
+    this.tank.setTank(hello.tank, [hello.block_side_m ?? 0, hello.block_width_m], box);
     this.say(hello.imageFault === null ? "" : `No video: ${hello.imageFault}.`);
     this.askForVideo();
   }

@@ -29,6 +29,7 @@ const hello = object({
   source: nullable(text),
   tank: nullable(checkArena),
   block_side_m: nullable(number),
+  block_width_m: nullable(number),
 });
 export type Hello = ReturnType<typeof hello> & {
   readonly image: ReturnType<typeof image> | null;
@@ -41,6 +42,7 @@ export const UNKNOWN: Hello = {
   source: null,
   tank: null,
   block_side_m: null,
+  block_width_m: null,
   image: null,
   imageFault: null,
 };

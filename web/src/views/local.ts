@@ -22,9 +22,10 @@ const TRIES = [
   ["let bonds break", "blocks=12&bond_rate=0.05&speed=5"],
 ] as const;
 
-/** Returns links to settings to try. */
-export function tries(): HTMLElement {
-  const links = TRIES.map(([words, settings]) => el("li", {}, el("a", { href: `#${settings}` }, ...rich(words))));
+/** Returns links to settings to try, those that the knobs can stand at. */
+export function tries(items: readonly Item[]): HTMLElement {
+  const offered = TRIES.filter(([, words]) => settingsIn(words, items, 0).size === words.split("&").length);
+  const links = offered.map(([words, settings]) => el("li", {}, el("a", { href: `#${settings}` }, ...rich(words))));
   return el("nav", { class: "tries", "aria-label": "Settings to try" }, el("p", {}, "Try:"), el("ul", {}, ...links));
 }
 

@@ -131,7 +131,7 @@ class Playground {
   private async showTank(content: unknown): Promise<void> {
     if (content === undefined) return;
     const section = checkTank(content, "");
-    this.tank.setTank(section.arena, section.side);
+    this.tank.setTank(section.arena, [section.side, section.width]);
     this.dots = section.shape === "dot";
     if (this.dots) this.tank.element.setAttribute("aria-label", "The tank: bodies and their trails");
     this.trails = section.trail_s > 0 ? new Trails(section.trail_s) : null;
@@ -161,7 +161,7 @@ class Playground {
       if (name !== "speed") this.outcomes?.outdate();
     });
     panel.append(el("h2", {}, section.title), this.actions(), knobs.element);
-    if (localCore() !== null) panel.append(tries());
+    if (localCore() !== null) panel.append(tries(section.items));
     if (section.note !== null) panel.append(el("p", { class: "note" }, section.note));
     return knobs;
   }

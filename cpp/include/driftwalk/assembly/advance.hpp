@@ -158,7 +158,9 @@ inline void add_drag(const Physics<Real, T, Law>& physics, const AheadMember<Rea
 }
 
 // Whether the faces that the water reaches are to be taken side by side: of a pack whose law and
-// flow are the same in each lane, where some are covered.
+// flow are the same in each lane, where three in ten are covered. With fewer, moving them costs
+// more than it saves: 4 blocks that assemble, single precision, 16 lanes, ran 10 % slower where any
+// covered face did, and a batch of joined tanks is as fast from 0 to 35 %.
 template <class Real, class T, class Law>
 inline bool has_faces_to_skip(const Physics<Real, T, Law>& physics, const Member<Real>* members,
                               int rows) {
@@ -166,13 +168,18 @@ inline bool has_faces_to_skip(const Physics<Real, T, Law>& physics, const Member
       physics.hidden_share > T(0)) {
     return false;
   }
-  auto covered = members[0].covered[0];
+  auto held = members[0].covered[0].v;
+  held ^= held;
   for (int row = 0; row < rows; ++row) {
     for (const auto& face : members[row].covered) {
-      covered = covered | face;
+      held -= face.v; // minus one where it is covered
     }
   }
-  return any(covered);
+  int count = 0;
+  for (int lane = 0; lane < Numbers<Real>::lanes; ++lane) {
+    count += static_cast<int>(held[lane]);
+  }
+  return 10 * count > 3 * 4 * rows * Numbers<Real>::lanes;
 }
 
 template <class Real, class T, class Law>

@@ -94,9 +94,7 @@ struct Fade {
 
   Fade(double fading, double end)
       : from{static_cast<T>(fading)}, per{static_cast<T>(1 / (end - fading))} {}
-  Real part(Real squared) const {
-    return min(max((squared - from) * per, Real(T(0))), Real(T(1)));
-  }
+  Real part(Real squared) const { return min(max((squared - from) * per, Real(T(0))), Real(T(1))); }
   Real value(Real at) const { return Real(T(1)) - at * at * (Real(T(3)) - Real(T(2)) * at); }
   Real slope(Real at) const { return Real(T(-6)) * at * (Real(T(1)) - at) * per; }
 };

@@ -98,8 +98,10 @@ void place_members(Scene& scene, int assembly);
 void place_by(Scene& scene, int assembly, int block, Vec2 at);
 // Members, offsets, inertia and joined faces of an assembly, from its blocks' cells and labels.
 void measure_assembly(const AssemblyRules& rules, Scene& scene, int assembly);
-// The same of an assembly whose members are linked.
+// Offsets and inertia of an assembly whose members are linked.
 void measure_members(const AssemblyRules& rules, Scene& scene, int assembly);
+// Which faces of its blocks have a neighbour on its lattice.
+void join_faces(const AssemblyRules& rules, Scene& scene, int assembly);
 
 // The blocks of an assembly by their cells: a table of buckets in the scene's scratch, in which the
 // lattice wraps around. Has to be cleared wherever it will be looked at.
@@ -112,13 +114,15 @@ public:
     scene_.cell_next[block] = first;
     first = block;
   }
-  bool has(int x, int y) const {
+  // The block in a cell, -1 where there is none.
+  int find(int x, int y) const {
     int b = head(x, y);
     while (b >= 0 && (scene_.block[b].cell_x != x || scene_.block[b].cell_y != y)) {
       b = scene_.cell_next[b];
     }
-    return b >= 0;
+    return b;
   }
+  bool has(int x, int y) const { return find(x, y) >= 0; }
 
 private:
   std::int32_t& head(int x, int y) const {

@@ -22,9 +22,9 @@ class SteppingPolicy(NamedTuple):
     every: int = 5
     """Time steps of a cycle; odd, so that a step is its middle."""
     stiffness: float = 1.0
-    """Most of 4 F' (n dt)² / m where forces begin to be distant. From 0.02 to 1, outcomes and times of
-    4000 runs of 4 blocks differ from those of one step by less than half of what chance makes of
-    l1 and by 0.005 in KS, with the same random numbers."""
+    """Most of 4 F' (n dt)² / m where forces begin to be distant. From 0.02 to 1, outcomes and times
+    of 4000 runs of 4 blocks differ from those of one step by less than half of what chance makes
+    of l1 and by 0.005 in KS, with the same random numbers."""
     fade: float = 1.5
     """Distance from which all is distant, over that up to which all is near. Fixed magnets that fly
     apart keep their energy to 2.5e-3 with 1.25, and to 5e-4 with this."""

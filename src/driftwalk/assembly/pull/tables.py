@@ -215,13 +215,14 @@ def block_pull(study: Study, table: MeasuredAttraction | None = None) -> BlockPu
             "leave the section out, or take squares"
         )
     mass = study.block.mass_kg * (1.0 + study.forces.added_mass_share)
-    given = study.interaction
+    given, bonds = study.interaction, study.assembly
     measured = table or table_of(study)
     if given.magnet or measured:
         _require_poles(study)
     return _block_pull(
         given, study.block.side_m, study.block.is_round,
         mass, study.time_step_s, study.water.density_kg_m3, measured,
+        loaded=bonds.bond_force_N > 0 or bonds.bond_strength_N > 0,
     )  # fmt: skip
 
 
@@ -234,6 +235,8 @@ def _block_pull(
     step: float,
     density: float,
     measured: MeasuredAttraction | None,
+    *,
+    loaded: bool,
 ) -> BlockPull:
     half, faces, centres, resistance = side / 2.0, None, None, None
     lever = half
@@ -272,7 +275,8 @@ def _block_pull(
         tables = tables._replace(
             oriented=_oriented(oriented, faces.contact, end, of_magnets=far is not None)
         )
-    if faces is not None and magnet is not None:
+    # A bond that breaks by its load would feel the impulse of a cycle as a force.
+    if faces is not None and magnet is not None and not loaded:
         nearest = max(faces.capped_at, end if far is not None else 0.0)
         tables = _stepped(tables, faces, nearest=nearest, mass=mass, step=step, others=others)
     tables.radial.update(

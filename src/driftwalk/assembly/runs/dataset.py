@@ -40,6 +40,8 @@ LAW_NAMES: Final = {
     "forces.stirring_length_m": "stirring_length",
 }
 """Names of drawn numbers of the law, by their keys in the study."""
+_SIZE: Final = ("block_shape", "block_side_m", "block_width_m")
+"""Attributes that a recording of a run has too."""
 DECIMALS: Final = 9
 """Times are kept to a nanosecond."""
 
@@ -287,5 +289,6 @@ def path_recording(path: xr.Dataset, *, run: int = 0) -> xr.Dataset:
             "format": "driftwalk",
             "arena": path.attrs["arena"],
             "sample_rate_Hz": 1.0 / float(path.attrs["sample_interval_s"]),
+            **{name: path.attrs[name] for name in _SIZE if name in path.attrs},
         },
     )

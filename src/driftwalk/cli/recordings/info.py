@@ -37,11 +37,11 @@ _ROWS: list[tuple[str, str, float]] = [
     ("speed, mean (cm/s)", "speed_mean_m_s", 100),
     ("speed, 99 % (cm/s)", "speed_99_percent_m_s", 100),
     ("speed, largest (cm/s)", "speed_max_m_s", 100),
-    ("turn rate, mean [rad/s]", "turn_rate_mean_rad_s", 1),
+    ("turn rate, mean (rad/s)", "turn_rate_mean_rad_s", 1),
     ("position noise (mm)", "position_noise_m", 1e3),
     ("  standard error (mm)", "position_noise_standard_error_m", 1e3),
-    ("orientation noise [deg]", "orientation_noise_rad", 57.29577951308232),
-    ("  standard error [deg]", "orientation_noise_standard_error_rad", 57.29577951308232),
+    ("orientation noise (deg)", "orientation_noise_rad", 57.29577951308232),
+    ("  standard error (deg)", "orientation_noise_standard_error_rad", 57.29577951308232),
     ("identity ambiguous (%)", "ambiguous_share", 100),
 ]
 _CIRCLE_ROWS: list[tuple[str, str, float]] = [

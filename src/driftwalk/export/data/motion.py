@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -73,11 +73,10 @@ def find_motions(source: Path, *, replicate: int | None = None) -> list[Motion]:
             f"{source} holds no motion: neither a recording (recording.nc) nor runs of blocks "
             "(path.nc); give the file of a recording or a simulation"
         )
-    side = _side_of_run(source)
+    size = _size_of_run(source)
     found = [motion for file in files for motion in _of_file(file, replicate)]
     for motion in found:
-        if side is not None:
-            motion.recording.attrs.setdefault("block_side_m", side)
+        motion.recording.attrs = size | motion.recording.attrs
     return found
 
 
@@ -111,7 +110,7 @@ def _of_worlds(file: Path, kind: str, replicate: int | None) -> Iterator[Motion]
         raise InputError(
             f"{file}: there is no {dimension} {replicate}: it holds {known[0]} to {known[-1]}"
         )
-    side = _side_of_simulation(stored)
+    size = _size_of_simulation(stored)
     for number in known if replicate is None else [replicate]:
         recording = (
             path_recording(stored, run=number)
@@ -123,35 +122,36 @@ def _of_worlds(file: Path, kind: str, replicate: int | None) -> Iterator[Motion]
                 ("time", "body"),
                 stored["assembly"].sel(run=number).transpose("time", "block").values,
             )
-        if side is not None:
-            recording.attrs["block_side_m"] = side
+        recording.attrs.update(size)
         yield Motion(f"{dimension}_{number}", recording)
 
 
-def _side_of_simulation(stored: xr.Dataset) -> float | None:
-    """Return the side of the block [m] that was simulated; None for another body."""
-    if "block_side_m" in stored.attrs:
-        return float(stored.attrs["block_side_m"])
-    if "model" in stored.attrs or "study" not in stored.attrs:
-        return None
-    return _side_of_study(parse_toml(str(stored.attrs["study"])))
+def _size_of_simulation(stored: xr.Dataset) -> dict[str, Any]:
+    """Return the attributes of shape and size of the block that was simulated; none of others."""
+    if "block_side_m" in stored.attrs or "model" in stored.attrs or "study" not in stored.attrs:
+        return {}
+    return _size_of_study(parse_toml(str(stored.attrs["study"])))
 
 
-def _side_of_run(folder: Path) -> float | None:
+def _size_of_run(folder: Path) -> dict[str, Any]:
     path = run_file(folder, MANIFEST_FILE)
     manifest = {} if path is None else read_json(path)
     if not isinstance(manifest, dict):
-        return None
+        return {}
     specification = manifest.get("specification")
     if isinstance(specification, dict) and specification.get("model"):
-        return None
-    return _side_of_study(manifest.get("study"))
+        return {}
+    return _size_of_study(manifest.get("study"))
 
 
-def _side_of_study(study: object) -> float | None:
+def _size_of_study(study: object) -> dict[str, Any]:
     block = study.get("block") if isinstance(study, dict) else None
-    side = block.get("side_m") if isinstance(block, dict) else None
-    return float(side) if isinstance(side, (int, float)) else None
+    if not isinstance(block, dict):
+        return {}
+    known = {key: block[key] for key in ("side_m", "width_m") if block.get(key) is not None}
+    if block.get("shape", "square") != "square":
+        known["shape"] = block["shape"]
+    return {f"block_{key}": value for key, value in known.items()}
 
 
 def frame_rate(recording: xr.Dataset) -> float | None:

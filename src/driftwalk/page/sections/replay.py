@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -37,7 +36,6 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
         When the path lacks poses or the side of the blocks.
     """
     require(path, "x", "y", "theta", "assembly", "time")
-    side = float(required(path, "block_side_m"))
     runs, every = _shares(path)
     thin = path.isel(run=slice(0, runs), time=slice(None, None, every))
     # The tank is two thousand steps wide or more; times are known to 0.06 ms, angles to 0.1°.
@@ -45,17 +43,15 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
     note = f"{count(runs, 'run')}, a position every {_interval(thin)}, to {1e3 * step:.2g} mm."
     if runs < path.sizes["run"]:
         note += f" {count(path.sizes['run'] - runs, 'more run')} in the file."
-    if "block_width_m" in path.attrs:
-        side = math.sqrt(4.0 / math.pi * side * float(path.attrs["block_width_m"]))
-        note += " Rectangles are drawn as discs of their area; films have their true shape."
-    if "block_shape" in path.attrs:
+    if path.attrs.get("block_shape") == "disc":
         thin = thin.assign(theta=thin["theta"] * np.nan)  # drawn as discs
     made = [_run(thin.isel(run=index), index, assembly, step) for index in range(runs)]
     names = {change["class"] for run in made for change in run["classes"]}
     return section(
         "replay", "replay", "Sample runs", note,
         arena=arena_part(path),
-        side=side,
+        side=float(required(path, "block_side_m")),
+        width=path.attrs.get("block_width_m"),
         time=encode_array(thin["time"].values, step=2.0**-14),
         runs=made,
         cells={name: cells_of(name, discs=are_discs(*names)) for name in sorted(names)},

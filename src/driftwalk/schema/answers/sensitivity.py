@@ -15,7 +15,6 @@ from driftwalk.schema.shapes import short_class
 if TYPE_CHECKING:
     import xarray as xr
 
-"""Suffixes that turn names of axes into keys of JSON."""
 LISTED_COMPONENTS: Final = 3
 _REFERENCE: Final = (
     *("complete", "runs", "realisations", "left_out", "blocks", "latching", "hidden_face_drag"),

@@ -36,6 +36,7 @@ SETTINGS: Final = (
     study
 attributes (blocks that are no squares):
     block_shape text: their shape
+    block_width_m number: width of a rectangle
 attributes (bonds break):
     bond_rate_per_s number: rate at which a bond breaks without load
     bond_force_N number: tension that multiplies the rate by e; 0: the rate is constant

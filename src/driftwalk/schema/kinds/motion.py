@@ -44,7 +44,9 @@ attributes (the tank is known):
     arena
     arena_found object: how the tank was found
 attributes (the block was stated):
-    block_side_m number: side of the block
+    block_shape text: its shape
+    block_side_m number: side of the block, diameter of a disc, length of a rectangle
+    block_width_m number: width of a rectangle
     block_mass_kg number: mass of the block
     block_depth_m number: wetted depth of a side face
     block_depth text: immersed or archimedes, instead of a length

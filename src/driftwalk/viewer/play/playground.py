@@ -211,10 +211,10 @@ class PlaySource(Playground):
 
     def _subtitle(self) -> str:
         study = self.tank.study
-        body = "discs" if study.block.is_round else "blocks"
-        tank = f"{study.tank.describe()}, {body} of {100.0 * study.block.side_m:g} cm"
+        tank = f"{study.tank.describe()}, {study.block.described.replace(' of ', 's of ', 1)}"
         return ". ".join([tank, *(f"Warning {text}" for text in self._warnings)])
 
     def _bodies(self) -> dict[str, Any]:
-        study = self.tank.study
-        return {"side": study.block.side_m, "blocks": study.assembly.blocks}
+        block = self.tank.study.block
+        size = {"side": block.side_m, "width": block.width_m}
+        return {**size, "blocks": self.tank.study.assembly.blocks}

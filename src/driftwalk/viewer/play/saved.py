@@ -98,7 +98,7 @@ def local_tank(source: PlaySource) -> dict[str, Any]:
         "rules": _rules(plan),
         "choices": _choices(source),
         "chirality": study.assembly.chirality,
-        "round": source.tank.study.block.is_round,
+        "shape": study.block.shape,
         "most_named": MOST_NAMED,
         "run_steps": whole_steps(study),
         "motion": _motion(source),

@@ -120,21 +120,11 @@ def knobs_for(tank: LiveTank, *, most_blocks: int) -> dict[str, Knob]:
         Whose values every range has to hold.
     most_blocks : int
         Blocks that the tank has room for.
-
-    Raises
-    ------
-    InputError
-        When the blocks are rectangles, which the page does not draw.
     """
-    if tank.study.block.shape == "rectangle":
-        raise InputError(
-            "the playground draws squares and discs, and the body is a rectangle (`block.shape`): "
-            "play with squares, or film the runs of an assembly"
-        )
     values = values_of(tank, speed=1.0)
     knobs = {knob.name: knob.reaching(values[knob.name]) for knob in KNOBS}
-    if tank.study.block.is_round:
-        # Discs have no faces.
+    if not tank.has_lattice:
+        # Discs have no faces, and rectangles latch as they lie.
         del knobs["hidden_face_drag"], knobs["faces"], knobs["magnets"]
         knobs["latching"] = replace(knobs["latching"], choices=("collision", "none"))
     return knobs | {"blocks": replace(knobs["blocks"], most=most_blocks)}
@@ -161,5 +151,5 @@ def values_of(tank: LiveTank, *, speed: float) -> dict[str, Any]:
 def most_blocks_in(tank: LiveTank) -> int:
     """Return how many blocks the playground offers: those that still have room to move."""
     study = tank.study
-    room = FILLED * tank_area(study.tank) / study.block.side_m**2
+    room = FILLED * tank_area(study.tank) / study.block.area_m2
     return max(min(int(room), MOST_BLOCKS), study.assembly.blocks)

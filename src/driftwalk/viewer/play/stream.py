@@ -41,6 +41,7 @@ def hello_line(tank: LiveTank) -> dict[str, Any]:
         "markers": "simulated",
         "tank": study.tank.to_arena(),
         "block_side_m": study.block.side_m,
+        "block_width_m": study.block.width_m,
         "body_count": None,
         "observed": True,
         "image": None,
@@ -79,17 +80,17 @@ def frame_line(tank: LiveTank, number: int, events: Sequence[LiveEvent]) -> dict
     ]
     outcome = tank.outcome
     side = tank.study.block.side_m
-    joined = [] if not tank.has_lattice else joined_faces(x, y, theta, assembly, side=side)
+    joined = joined_faces(x, y, theta, assembly, side=side) if tank.has_lattice else None
     return {
         "type": "frame",
         "frame": number,
         "time_s": tank.time,
         "bodies": bodies,
-        "joined": [[str(a), face, str(b), other] for a, face, b, other in joined],
+        "joined": joined and [[str(a), face, str(b), other] for a, face, b, other in joined],
         "outcome": outcome,
         "possible": [outcome],
         "hidden": [],
-        "events": [_event(event, joined) for event in events],
+        "events": [_event(event, joined or []) for event in events],
         "dropped_frames": 0,
         "latency_s": 0.0,
     }

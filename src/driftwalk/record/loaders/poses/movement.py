@@ -29,10 +29,10 @@ USUAL: Final = Confidence(0.6, "movement's threshold")
 
 TEXTS: Final = (
     *("arena", "arena_found", "origin_shift_m", "simulated", "tracked_from", "complete"),
-    "interrupted",
+    *("interrupted", "block_shape"),
 )
 NUMBERS: Final = (
-    *("block_side_m", "block_mass_kg", "metres_per_pixel", "position_quantum_m"),
+    *("block_side_m", "block_width_m", "block_mass_kg", "metres_per_pixel", "position_quantum_m"),
     *("sample_rate_Hz", "time_origin_unix_s"),
 )
 """Attributes that are taken over of a recording that driftwalk wrote in this format."""
