@@ -41,7 +41,7 @@ class RemlPolicy(NamedTuple):
     the motion does not follow the model, or tells nothing of C_d. Chosen by hand."""
     true_pull: float = 0.67
     """The pull of a disc's prior on the true flow, over that on the fitted one, whose errors add to
-    it. The mean of 29 recordings of known flow; it was not chosen by their C_d."""
+    it. The first 29 recordings of known flow; it was not chosen by their C_d."""
     most_noise_move: float = 1.0
     """Largest move of ln(tracking noise) along the ridge of a criterion that has a minimum: beyond
     it nothing holds the noise. In recordings of the model it moves by some hundredths."""
@@ -179,7 +179,8 @@ def _minimum(found: list[Profile], share: float = 1.0) -> tuple[float, float]:
     A share of the determinant's slope counts, and the pull of the prior
     (`driftwalk.likelihood.filter.forgetting`).
 
-    The standard deviation is infinite where there is no minimum near the points.
+    The standard deviation is infinite where there is no minimum near the points. The pull is not in
+    it: with the true coefficients it hardly depends on C_d, so its slope is an error of the fitted.
 
     Of the likelihood only the slopes are used. They come from the predictions, as in the search;
     its values also hold what the covariances of the innovations have to say about C_d, which is
@@ -190,12 +191,16 @@ def _minimum(found: list[Profile], share: float = 1.0) -> tuple[float, float]:
     at = (np.array([one.log_drag for one in found]) - centre) / scale
     degree = min(2, len(found) - 1)
     polynomial = np.polynomial.Polynomial
-    slopes = [(one.slope + one.pull.slope) * scale for one in found]
+    slopes = [one.slope * scale for one in found]
+    pulls = [one.pull.slope * scale for one in found]
     determinants = [
         share * (one.half_log_determinant - found[0].half_log_determinant) for one in found
     ]
     slope = polynomial.fit(at, slopes, degree).convert()
     slope = slope + polynomial.fit(at, determinants, degree).convert().deriv()
+    steepness = slope.deriv()
+    if any(pulls):
+        slope = slope + polynomial.fit(at, pulls, degree).convert()
     lattice = np.linspace(at.min() - 0.5, at.max() + 0.5, 2001)
     values = slope(lattice)
     upward = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
@@ -203,7 +208,9 @@ def _minimum(found: list[Profile], share: float = 1.0) -> tuple[float, float]:
         downhill = -1 if values.sum() < 0.0 else 0
         return centre + scale * float(lattice[downhill]), math.inf
     best = lattice[upward[np.argmin(np.abs(lattice[upward]))]]
-    return centre + scale * float(best), scale / math.sqrt(float(slope.deriv()(best)))
+    curvature = float(steepness(best))
+    std = scale / math.sqrt(curvature) if curvature > 0.0 else math.inf
+    return centre + scale * float(best), std
 
 
 def _coefficients_at(found: list[Profile], nearest: Profile, log_drag: float) -> Floats:

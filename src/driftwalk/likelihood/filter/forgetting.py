@@ -36,7 +36,7 @@ BLOCK = 4096
 
 
 class Pull(NamedTuple):
-    """What the prior's pull on the coefficients adds to the score of ln C_d."""
+    """The part of the score of ln C_d that comes from the prior's pull on the coefficients."""
 
     slope: float = 0.0
     """D' M Lambda c."""
