@@ -1,12 +1,14 @@
 """Make recordings of discs and of glued dimers: a CSV as a tracker writes it, the truth as JSON.
 
-    python studies/bodies/recordings.py OUT --set discs|squares|ode|dimers [--count 20] [--first 1]
-                                        [--kind paper|floating]
+    python studies/bodies/recordings.py OUT --set discs|squares|ode|own|dimers [--count 20]
+                                        [--first 1] [--kind paper|floating]
 
 Worlds are drawn one after the other; one is kept if the body is seldom at the wall and if its
 recording could tell C_d (`information.py` of the study of verdicts), both by the true motion alone.
 `squares` are the worlds of the discs with square blocks, for the time that a fit takes. `--first`
-begins with another world: discs from 101 on have been fitted by no version that was tuned.
+begins with another world: discs from 101 on have been fitted by no version that was tuned. `own`
+are discs of the paper's law that driftwalk itself simulates, 10 minutes each, to compare with those
+of `ode`.
 """
 
 from __future__ import annotations
@@ -31,18 +33,21 @@ from ranges import (
     DRAG_COEFFICIENT,
     FORCE_INTERVAL_S,
     FORCE_STD_N,
+    MASS_KG,
     ORIENTATION_NOISE_DEG,
     POSITION_NOISE_M,
+    RADIUS_M,
     SAMPLE_S,
     SETTLING_S,
+    SIDE_M,
     WALL_FRICTION,
     WALL_RESTITUTION,
     Kind,
 )
 from worlds import Block, Camera, World
 
-SEEDS = {"discs": 81_000, "squares": 81_000, "ode": 82_000, "dimers": 83_000}
-COUNTS = {"discs": 20, "squares": 8, "ode": 8, "dimers": 24}
+SEEDS = {"discs": 81_000, "squares": 81_000, "ode": 82_000, "own": 81_000, "dimers": 83_000}
+COUNTS = {"discs": 20, "squares": 8, "ode": 8, "own": 20, "dimers": 24}
 MOST_WALL_SHARE = 0.3
 LEAST_VISITED_SHARE = 0.1
 """Of the tank."""
@@ -50,7 +55,7 @@ AT_ONCE = 36
 KINDS = ("paper", "floating")
 HIDDEN_SHARES = (0.0, 0.5, 1.0)
 CORRELATIONS = (0.0, 0.8)
-ODE_STEP_S = 0.5e-3
+ODE_STEP_S, OWN_STEP_S = 0.5e-3, 2.5e-3
 OTHER_SEED = 0x5EED
 """The dimer of a pair has the seed of the block with these bits turned."""
 
@@ -65,7 +70,7 @@ def main() -> None:
     parser.add_argument("--kind", choices=KINDS, help="of the discs; default: half of each")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    make = {"dimers": dimers, "ode": ode}.get(options.which, discs)
+    make = {"dimers": dimers, "ode": others, "own": others}.get(options.which, discs)
     kinds = [options.kind] if options.kind else KINDS
     make(options.out, options.which, options.count or COUNTS[options.which], options.first, kinds)
 
@@ -144,17 +149,22 @@ def gets_about(wall_share: float, visited_share: float) -> bool:
     return wall_share < MOST_WALL_SHARE and visited_share > LEAST_VISITED_SHARE
 
 
-def ode(out: Path, which: str, count: int, first: int, _: Sequence[str]) -> None:
-    """Make recordings of discs by the Open Dynamics Engine."""
-    shapes.sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
-    from peer import build_peer
-
+def others(out: Path, which: str, count: int, first: int, _: Sequence[str]) -> None:
+    """Make recordings of discs by the Open Dynamics Engine, or by driftwalk."""
+    found, number = 0, first
     with tempfile.TemporaryDirectory() as folder:
-        program, found, number = build_peer(Path(folder), "ode_recording"), 0, first
+        program = built(Path(folder)) if which == "ode" else None
         while found < count:
             world = drawn(which, number)
             number += 1
-            path = by_ode(program, world, Path(folder) / "case.txt")
+            if which == "own":
+                world = replace(world, name=f"d{number - 1:03d}", minutes=10.0)
+            if world.body.floating:
+                continue
+            if program is None:
+                path = by_driftwalk(world)
+            else:
+                path = by_ode(program, world, Path(folder) / "case.txt")
             motions = Motion(
                 path, np.gradient(path, SAMPLE_S, axis=1), np.zeros(path.shape),
                 np.zeros(path.shape), np.abs(path) > 0.15 - 0.5 * 0.03 - 1e-4,
@@ -166,6 +176,48 @@ def ode(out: Path, which: str, count: int, first: int, _: Sequence[str]) -> None
                 found += 1
                 world = replace(world, options=known(tanks.body))
                 write_world(out, world, motions, 0, facts, heading=False)
+
+
+def built(folder: Path) -> Path:
+    """Compile the program on the Open Dynamics Engine into a folder."""
+    shapes.sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
+    from peer import build_peer
+
+    return Path(build_peer(folder, "ode_recording"))
+
+
+def by_driftwalk(world: World) -> npt.NDArray[np.complex128]:
+    """Return the places of a disc, shape (1, samples)."""
+    import driftwalk as dw
+    from driftwalk.schema import build_flow_field
+
+    body, water = world.body, world.body.flow.modes[0]
+    study = dw.apply_overrides(
+        dw.Study(),
+        {
+            "simulation.time_step_s": OWN_STEP_S,
+            "block.shape": "disc",
+            "block.side_m": SIDE_M,
+            "block.mass_kg": MASS_KG,
+            "forces.drag_coefficient": body.drag_coefficient,
+            "forces.force_std_N": body.force_std,
+            "tank.diameter_m": 2.0 * RADIUS_M,
+            "tank.wall_friction": body.friction,
+            "tank.wall_restitution": body.restitution,
+            "observation.position_noise_m": 0.0,
+            "observation.position_quantum_m": 0.0,
+        },
+    )
+    field = build_flow_field(
+        AXIS, AXIS, u=water.real, v=water.imag, flag=np.ones(water.shape, dtype=np.int8)
+    )
+    settling = round(SETTLING_S / SAMPLE_S)
+    samples = settling + round(60.0 * world.minutes / SAMPLE_S) + 1
+    run = dw.simulate(
+        study, field, sample_time=SAMPLE_S * np.arange(samples), replicates=1, seed=world.seed,
+        start=dw.simulation.Start(body.start.real, body.start.imag, 0.0),
+    )  # fmt: skip
+    return (run["x"].values[0, :, 0] + 1j * run["y"].values[0, :, 0])[np.newaxis, settling:]
 
 
 def by_ode(program: Path, world: World, case: Path) -> npt.NDArray[np.complex128]:

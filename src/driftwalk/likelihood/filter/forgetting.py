@@ -8,22 +8,60 @@ M = (A + Lambda)^-1, the score of ln kappa at the fitted c is too large by
 to first order; psi is what the velocity remembers of the flow. The slope of ln det / 2 in the
 restricted likelihood is tr(M A), which is the same only where the velocity forgets faster than the
 body crosses the support of a coefficient (Nickell 1981).
+
+The prior pulls the fitted c from the true one by M Lambda c, which adds
+
+    tr(M A M Lambda) - c' Lambda M A M Lambda c + D' M Lambda c
+
+with D = -integral of kappa_t^2 (v - phi'c) phi / q, the information that c shares with ln kappa. Of
+flows as the prior has them all of it is tr(M A) on average: the restricted likelihood is right.
+Real flows are smoother, so the sum is that of the fitted c.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats
-from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import FILTER, Series
 from driftwalk.likelihood.spline import Spline, basis_matrix
 
 BLOCK = 4096
 """Samples whose bases are held at once."""
+
+
+class Pull(NamedTuple):
+    """What the prior's pull on the coefficients adds to the score of ln C_d."""
+
+    slope: float = 0.0
+    """D' M Lambda c."""
+    share: float = 0.0
+    """The rest, as a share of tr(M A)."""
+
+
+def pull_of_prior(sums: Sums, added: Sums, factor: Any, step: Floats, part: float = 1.0) -> Pull:
+    """Return what the pull adds at `step` from the coefficients of the sums, a part of it.
+
+    `added` are the sums with the prior in them, `factor` the Cholesky factor of their information
+    on the coefficients.
+    """
+    from scipy.linalg import cho_solve
+
+    information = sums.information[:-1, :-1]
+    prior = added.information[:-1, :-1] - information
+    away = cho_solve(factor, sums.score[:-1] - added.score[:-1] + prior @ step)
+    lost = cho_solve(factor, prior)
+    both = float(np.trace(lost) - np.sum(lost * lost.T))
+    whole = len(lost) - float(np.trace(lost))
+    return Pull(
+        part * float(sums.information[-1, :-1] @ away),
+        part * (both - float(away @ information @ away)) / whole,
+    )
 
 
 def due_share(passes: Passes, prior: Floats, point: Point) -> float:
