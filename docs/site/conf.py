@@ -88,8 +88,12 @@ sphinx_gallery_conf = {
     "write_computation_times": False,
     "abort_on_example_error": True,
     "matplotlib_animations": False,
+    # What an example prints, and no names of objects.
+    "capture_repr": ("_repr_html_",),
     "image_scrapers": ("matplotlib",),
-    "reset_modules": ("matplotlib",),
+    # Twice as fine for screens that can.
+    "image_srcset": ["2x"],
+    "reset_modules": ("matplotlib", "print_look.reset"),
 }
 
 

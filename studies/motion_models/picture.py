@@ -19,6 +19,7 @@ import driftwalk as dw
 from driftwalk.conditions import Conditions, Neighbours
 from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Tank
+from driftwalk.plot.parts.style import INK, add_colorbar, new_panels, print_style
 from driftwalk.schema import Track
 from driftwalk.simulation.backend import Camera
 from driftwalk.simulation.initial import Start
@@ -91,37 +92,42 @@ def draw(axes: Axes, name: str, number: int) -> LineCollection:
         np.stack([points[:-1], points[1:]], axis=1),
         cmap="viridis_r",
         norm=mpl.colors.Normalize(0.0, FASTEST_CM_S),
-        linewidths=1.3,
+        linewidths=0.9,
     )
     lines.set_array(np.hypot(np.diff(x), np.diff(y)) * RATE_HZ)
     axes.add_collection(lines)
-    axes.add_patch(mpl.patches.Circle((0, 0), 100 * RADIUS_M, fill=False, color="0.5", lw=0.8))
+    axes.add_patch(mpl.patches.Circle((0, 0), 100 * RADIUS_M, fill=False, color=INK, lw=0.8))
     if "neighbours" in name:
         for place in OTHERS_M:
             axes.add_patch(mpl.patches.Circle(100 * np.array(place), 0.8, color="0.6"))
-    axes.plot(x[0], y[0], "o", color="black", markersize=3)
+    axes.plot(x[0], y[0], "o", color="black", markersize=2.5)
     axes.set(
         xlim=(-16, 16), ylim=(-16, 16), aspect="equal", xticks=(-10, 0, 10), yticks=(-10, 0, 10)
     )
-    axes.set_title(name, fontsize=9)
+    axes.set_title(name)
     return lines
 
 
 def main(out: Path) -> None:
     """Draw all, and write the picture."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(15.0, 5.2), layout="constrained")
-    panels = figure.subplots(2, 7, sharex=True, sharey=True)
-    for number, (axes, name) in enumerate(zip(panels.flat, NAMES, strict=True)):
-        lines = draw(axes, name, number)
-    for axes in panels[-1]:
-        axes.set_xlabel("x (cm)")
-    for axes in panels[:, 0]:
-        axes.set_ylabel("y (cm)")
-    figure.colorbar(lines, ax=panels, label="speed (cm/s)", shrink=0.8, extend="max")
     out.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(out, dpi=110)
+    with print_style():
+        figure, panels = new_panels(
+            3, 5, height_mm=116.0, layout="compressed", sharex=True, sharey=True
+        )
+        for number, axes in enumerate(panels):
+            axes.set(xlabel="x (cm)", ylabel="y (cm)")
+            axes.label_outer()
+            if len(NAMES) - 5 <= number < 10:
+                # The lowest of its column.
+                axes.set_xlabel("x (cm)")
+                axes.tick_params(labelbottom=True)
+        for axes in panels[len(NAMES) :]:
+            axes.remove()
+        for number, (axes, name) in enumerate(zip(panels, NAMES, strict=False)):
+            lines = draw(axes, name, number)
+        add_colorbar(lines, panels[: len(NAMES)], "speed (cm/s)", extend="max")
+        figure.savefig(out, dpi=160)
 
 
 if __name__ == "__main__":

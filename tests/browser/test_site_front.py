@@ -21,6 +21,7 @@ from synthetic_calibration import bundled_recording
 import driftwalk as dw
 from browser.all_kinds import page_of
 from browser.conftest import DESKTOP, PHONE, Visit
+from browser.first_motion import LOOP, require_soon
 from browser.readable import faults
 from driftwalk.page.chapters import in_chapters
 from driftwalk.page.sections.fit import fit_sections
@@ -80,6 +81,10 @@ def test_the_front_page(
     assert sorted(names) == ["front.css", "front.js", "index.html", "logo.svg", "pages.js"]
     loaded = (front, *(front.parent / "_static" / name for name in names if name != front.name))
     assert sum(path.stat().st_size for path in loaded) < FRONT_BYTES
+
+
+def test_the_loop_moves_at_once(browser: Any, front: Path) -> None:
+    require_soon(browser, front.as_uri(), LOOP)
 
 
 def test_the_loop_can_be_held_and_stands_still_for_those_who_ask(

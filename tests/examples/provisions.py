@@ -749,7 +749,10 @@ PAGES: dict[str, Page] = {
         },
         draws=False,
         slow=True,
-        parts_weekly=("play run/", "play --study", "play --tank", "play --live", "play --model"),
+        parts_weekly=tuple(
+            f"play {word}"
+            for word in ("run/", "--study", "--tank", "--body-shape", "--live", "--model")
+        ),
     ),
     "docs/reference/datasets.md": Page(
         provide=_files(_search("search.toml"), _with_intervals, _minutes(recording=0.5)),

@@ -185,6 +185,32 @@ def test_a_rectangle_of_equal_sides_is_the_square_until_it_latches(tank: str, ba
     np.testing.assert_array_equal(first[0], first[1])
 
 
+@pytest.mark.parametrize("blocks", [8, 26])
+@pytest.mark.parametrize("latching", ["none", "collision"])
+def test_a_rectangle_is_the_one_with_swapped_sides_turned_by_a_quarter(
+    latching: str, blocks: int
+) -> None:
+    """Few are looked at in all pairs, many by a list of near ones; events and places are alike."""
+    column, row = np.divmod(np.arange(blocks), 6)
+    start = np.stack([0.044 * (column - 2.0), 0.024 * (row - 2.5), 0.0 * row], axis=1)
+    swapped = {"block.side_m": WIDTH, "block.width_m": LENGTH}
+    found = []
+    for keys, turn in (({}, 0.0), (swapped, np.pi / 2)):
+        case = dw.apply_overrides(
+            study(tank=0.3, step=0.01, blocks=blocks, latching=latching),
+            keys | {"forces.force_std_N": 1e-3, "block.depth_m": 0.03},
+        )
+        tank = LiveTank(case, dw.tank30_flow(), seed=2, start=start + np.array([0.0, 0.0, turn]))
+        tank.advance(1.5)
+        events = [(event.time, event.blocks, event.outcome) for event in tank.events()]
+        found.append((tank.x + 1j * tank.y, tank.theta - turn, events))
+    (place, theta, events), (other, turned, others) = found
+    assert np.abs(place - other).max() < 1e-6
+    assert np.abs(np.sin(theta - turned)).max() < 1e-4
+    assert events == others
+    assert len(events) > 3 or latching == "none"
+
+
 def bouncing(pose: Any, velocity: Any, *, step: float, tank: float, restitution: float) -> Any:
     """Hard rectangles that fly without water, shape (worlds, blocks, 3)."""
     worlds, blocks, _ = pose.shape

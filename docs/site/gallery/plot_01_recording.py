@@ -2,8 +2,8 @@
 A recording
 ===========
 
-A track of one block in a round tank, coloured by time. `load` reads a tracker's file; this one
-comes with driftwalk, simulated by another engine.
+A track of one block in a round tank, coloured by time; the circle is its start. `load` reads a
+tracker's file; this one comes with driftwalk, simulated by another engine.
 """
 
 import matplotlib.pyplot as plt
@@ -11,5 +11,5 @@ import matplotlib.pyplot as plt
 import driftwalk as dw
 
 recording = dw.tank30_recording()
-figure, ax = plt.subplots(figsize=(5.5, 4.4), layout="constrained")
+figure, ax = plt.subplots(figsize=(3.5, 3.1), layout="compressed")
 dw.plot.trajectory(recording, ax, start=0.0, stop=120.0)

@@ -17,5 +17,5 @@ print(fit["estimate"].to_series())
 # %%
 # The flow that it found:
 
-figure, ax = plt.subplots(figsize=(5.5, 4.4), layout="constrained")
+figure, ax = plt.subplots(figsize=(3.5, 3.1), layout="compressed")
 dw.plot.flow(fit, ax)

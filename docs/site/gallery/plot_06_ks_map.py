@@ -3,8 +3,9 @@ The map of KS distances
 =======================
 
 The paper's calibration: simulate the block at every setting of drag coefficient and stochastic
-force, and compare its steps with the recording's. The minimum is the answer; the line in the colour
-bar is the noise floor. This is a coarse map of ten minutes in the true flow, a few seconds of work.
+force, and compare its steps with the recording's. The highest score is the answer; the line in the
+colour bar is the noise floor. This is a coarse map of ten minutes in the true flow, a few seconds
+of work.
 """
 
 import matplotlib.pyplot as plt
@@ -24,11 +25,13 @@ calibration = dw.calibrate(recording, study=study, flow=dw.tank30_flow())
 print(calibration["estimate"].to_series())
 
 # %%
-figure, ax = plt.subplots(figsize=(6, 4.4), layout="constrained")
+figure, ax = plt.subplots(figsize=(4.2, 3.1), layout="constrained")
 dw.plot.map(calibration, ax)
+figure.legend(loc="outside upper center", ncols=3)
 
 # %%
 # Estimates from simulated recordings at the optimum say how well the parameters are known:
 
-figure, ax = plt.subplots(figsize=(5.5, 4.4), layout="constrained")
+figure, ax = plt.subplots(figsize=(4.2, 3.1), layout="constrained")
 dw.plot.bootstrap(calibration, ax)
+figure.legend(loc="outside upper center", ncols=3)

@@ -16,7 +16,7 @@ values = {
     "wall_slowing": 0.3, "wall_range": 0.02, "wall_follow": 3.0,
 }  # fmt: skip
 times = [0.05 * k for k in range(1200)]
-figure, axes = plt.subplots(1, 4, figsize=(13, 3.6), layout="constrained")
+figure, axes = plt.subplots(1, 4, figsize=(6.3, 1.9), layout="compressed")
 names = {
     "active": "(a) active", "run_tumble": "(b) runs and tumbles", "run_rest": "(c) runs and rests",
     "active+wall+follow": "(d) follows the wall",
@@ -27,3 +27,5 @@ for (name, title), ax in zip(names.items(), axes, strict=True):
     path = dw.simulate(model, parameters=chosen, study=dw.Study(), sample_time=times, seed=3)
     dw.plot.trajectory(path.isel(replicate=0), ax, colorbar="none")
     ax.set_title(title, loc="left")
+    ax.set_xticks((-10, 0, 10))
+    ax.label_outer()

@@ -29,5 +29,5 @@ few = Budget(design=64, starts=2, short=8, long=20)
 models = ["inertial", "active+wall", "run_rest+wall"]
 study = dw.Study(calibration={"bootstrap": 0})
 found = dw.calibration.compare_models(path.isel(replicate=0), models, study=study, budget=few)
-figure, ax = plt.subplots(figsize=(8, 3.4), layout="constrained")
+figure, ax = plt.subplots(figsize=(6.3, 2.4), layout="constrained")
 dw.figures.plot_models(found, ax)

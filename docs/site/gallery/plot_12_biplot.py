@@ -20,10 +20,10 @@ axes_of_map = {
 }
 sensitivity = dw.sensitivity_map(study, flow, axes=axes_of_map, reference=reference)
 
-figure, ax = plt.subplots(figsize=(6, 4.4), layout="constrained")
+figure, ax = plt.subplots(figsize=(4.2, 3.1), layout="constrained")
 dw.plot.l1_map(sensitivity, ax)
 
 # %%
 components = dw.principal_components(sensitivity)
-figure, ax = plt.subplots(figsize=(7, 5), layout="constrained")
+figure, ax = plt.subplots(figsize=(5, 3.6), layout="constrained")
 dw.plot.biplot(components, ax, sensitivity=sensitivity)

@@ -23,11 +23,13 @@ camera = dw.track.Camera.from_scale(640, 480, px_per_m=1500.0)
 marker = dw.track.propose_markers([image for _, image in frames[:5]], camera).marker
 detector = dw.track.TwoColourDetector(marker, camera)
 
-figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
-for k, ax in zip((0, len(frames) - 1), axes, strict=True):
+figure, axes = plt.subplots(1, 2, figsize=(6.3, 2.6), layout="compressed")
+for letter, k, ax in zip("ab", (0, len(frames) - 1), axes, strict=True):
     time, image = frames[k]
     found, rejected = detector.detect(image)
     ax.imshow(dw.track.explain_frame(image, found, rejected, camera=camera)[:, :, ::-1])
-    ax.set(title=f"{time:.1f} s", xlabel="column (px)", ylabel="row (px)")
+    ax.set(xlabel="column (px)", ylabel="row (px)")
+    ax.set_title(f"({letter}) {time:.1f} s", loc="left")
+    ax.label_outer()
     x, y = float(recording["x"][k, 0]), float(recording["y"][k, 0])
     print(f"off by {1e3 * np.hypot(found[0].x - x, found[0].y - y):.3f} mm")

@@ -33,16 +33,15 @@ import verify  # noqa: E402
 
 model = mujoco.MjModel.from_xml_path(str(work / "tank" / "tank.xml"))
 own = dict(np.load(work / "tank" / "reference.npz"))
-plt.rcParams["axes.prop_cycle"] = plt.cycler(color=["#0072B2", "#D55E00", "#009E73", "#CC79A7"])
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(6.3, 2.9), layout="constrained")
 for row, replicate in enumerate(own["noisy_replicate"]):
     x, y, theta = (own[f"noisy_{key}"][row] for key in ("x_m", "y_m", "theta_rad"))
     poses = verify.run(
         model, own["time_s"], (x[0], y[0], theta[0]), replicate=int(replicate), noise=True
     )
-    (line,) = left.plot(1e2 * x, 1e2 * y, lw=5, alpha=0.4)
-    left.plot(1e2 * poses[:, 0], 1e2 * poses[:, 1], "k", lw=1)
-    left.plot(1e2 * x[0], 1e2 * y[0], "o", color=line.get_color(), ms=7)
+    (line,) = left.plot(1e2 * x, 1e2 * y, lw=3.5, alpha=0.4)
+    left.plot(1e2 * poses[:, 0], 1e2 * poses[:, 1], "k", lw=0.7)
+    left.plot(1e2 * x[0], 1e2 * y[0], "o", color=line.get_color(), ms=5)
     distance = np.hypot(poses[:, 0] - x, poses[:, 1] - y)
     right.plot(own["time_s"], 1e6 * distance, color=line.get_color())
 mujoco.set_mjcb_passive(None)

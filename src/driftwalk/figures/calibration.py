@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.distances import LEGEND_ORDER, plot_ks_map, plot_refined_map
-from driftwalk.plot.flow_field import COMPONENTS, SPEED_LABEL, plot_flow, velocity_of
+from driftwalk.plot.flow_field import COMPONENTS, add_speed_bar, plot_flow, top_speed
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.labels import plot_parameters
 from driftwalk.plot.step_densities import plot_density_panels, plot_steps, shared_setting_text
@@ -72,12 +72,7 @@ def flow_figure(flow: xr.Dataset) -> Figure:
     if not has_block:
         ax = style.axes_or_new(None, height_mm=76.0, layout="compressed")
         return style.figure_of(plot_flow(flow, ax))
-    import numpy as np
-
-    top = max(
-        float(np.nanmax(np.hypot(*velocity_of(flow, field)[:2]), initial=0.0)) / 100.0
-        for field in ("block", "water")
-    )
+    top = max(top_speed(flow, field) for field in COMPONENTS)
     figure, row = style.new_panels(
         1, 2, height_mm=92.0, layout="compressed", sharex=True, sharey=True
     )
@@ -87,7 +82,7 @@ def flow_figure(flow: xr.Dataset) -> Figure:
     filled = any(str(patch.get_label()).startswith("filled") for patch in row[1].patches)
     hatched = " (hatched: filled, not measured)" if filled else ""
     style.letter_panels(row, ["block velocity", f"corrected flow{hatched}"])
-    style.add_colorbar(row[1].collections[0], row, SPEED_LABEL)
+    add_speed_bar(row[1].collections[0], row)
     return figure
 
 

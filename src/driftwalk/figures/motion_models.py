@@ -11,6 +11,7 @@ import numpy as np
 from driftwalk.figures.write import Figures
 from driftwalk.plot.model_check import label_checks, plot_check_ratios, plot_own_aspects
 from driftwalk.plot.parts import style
+from driftwalk.plot.parts.labels import model_words
 from driftwalk.schema.answers.model_comparison import own_score
 from driftwalk.schema.answers.parts import each
 from driftwalk.schema.check import require_kind
@@ -85,7 +86,7 @@ def pairs_figure(calibration: xr.Dataset) -> Figure:
     axes[0].set_yticks([])
     counts = calibration.attrs["estimate_from"] == "summaries"
     figure.suptitle(
-        f"{calibration.attrs['model']}: values that could have given the recording "
+        f"{model_words(calibration.attrs['model'])}: values that could have given the recording "
         "(orange: estimate)"
         + ("" if counts else "; they do not count, the estimate is the search's")
     )
@@ -110,8 +111,8 @@ def profiles_figure(calibration: xr.Dataset) -> Figure:
     for ax in axes[::across]:
         ax.set_ylabel("rise of the misfit")
     figure.suptitle(
-        f"{calibration.attrs['model']}: misfit along each parameter, the others at their best "
-        f"(grey: {confidence:.0%} level; dashed: interval)"
+        f"{model_words(calibration.attrs['model'])}: misfit along each parameter, the others at "
+        f"their best (grey: {confidence:.0%} level; dashed: interval)"
     )
     return figure
 
@@ -121,7 +122,7 @@ def quality_figure(calibration: xr.Dataset) -> Figure:
     figure, row = style.new_panels(1, 2, height_mm=72.0)
     aspects, checks = row
     held = calibration["held_out_distance"].values
-    name = str(calibration.attrs["model"])
+    name = model_words(calibration.attrs["model"])
     aspects.plot(held, np.arange(held.size), "o", ms=3.5, color=style.BLUE, label=name)
     plot_own_aspects(calibration, aspects, label="the recording's own parts")
     plot_check_ratios(calibration, checks, color=style.BLUE)
@@ -218,7 +219,7 @@ def _figure(comparison: xr.Dataset) -> Figure:
     figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=ranking_mm + 82.0)
     grid = figure.add_gridspec(2, 2, height_ratios=(ranking_mm + 12.0, 60.0))
     parts: dict[str, tuple[Any, Callable[..., object]]] = {
-        "on blocks that none was fitted to": (grid[0, :], plot_models),
+        "held-out blocks": (grid[0, :], plot_models),
         "the same by aspect": (grid[1, 0], _plot_aspects),
         "not fitted, 20 worlds": (grid[1, 1], _plot_checks),
     }
@@ -226,6 +227,9 @@ def _figure(comparison: xr.Dataset) -> Figure:
     for ax, (_, draw) in zip(panels, parts.values(), strict=True):
         draw(comparison, ax)
     style.letter_panels(panels, list(parts))
+    # Of the colours of both panels of the second row.
+    handles, names = panels[1].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=len(names))
     return figure
 
 
@@ -274,7 +278,7 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
     own = own_score(comparison)
     ax.axvline(own, color=style.INK, lw=0.6, ls="--", label="the recording's own parts")
     names = [
-        str(name) if walk else f"{name} ({verdict})"
+        name if walk else f"{model_words(name)} ({verdict})"
         for name, walk, verdict in zip(
             *(shown[of].values for of in ("model", "baseline", "verdict")), strict=True
         )
@@ -283,7 +287,8 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_ylim(-0.6, place.size - 0.4)
     ax.set_xlim(left=0.0)
     ax.set_xlabel("distance, mean of D / floor over the aspects")
-    ax.legend(loc="lower left")
+    # Above: points and the line of the recording's own parts are anywhere.
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.0)
     return ax
 
 
@@ -291,12 +296,9 @@ def _plot_aspects(comparison: xr.Dataset, ax: Axes) -> None:
     """Draw the distances of the first models in each aspect, and the recording's own."""
     place = np.arange(comparison.sizes["aspect"])
     for one, (color, marker) in _first(comparison):
-        held, name = one["held_out_distance"].values, str(one["model"].values)
+        held, name = one["held_out_distance"].values, model_words(str(one["model"].values))
         ax.plot(held, place, marker, ms=3.5, color=color, label=name)
-    plot_own_aspects(comparison, ax, label="own")
-    # Room for the names: points are anywhere on the left.
-    ax.set_xlim(0.0, 1.6 * ax.get_xlim()[1])
-    ax.legend(loc="best")
+    plot_own_aspects(comparison, ax, label="the recording's own parts")
 
 
 def _plot_checks(comparison: xr.Dataset, ax: Axes) -> None:

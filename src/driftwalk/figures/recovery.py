@@ -107,7 +107,8 @@ def plot_flow_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax = style.axes_or_new(ax)
     for at, look, part in _groups(recovery):
         ax.plot(at, 100.0 * part["flow_error"].values, "o", **look)
-    ax.set(ylim=(0.0, None), ylabel="flow error (% of rms speed)")
+    # Room above: nearly equal errors would lie on the edge.
+    ax.set(ylim=(0.0, 1.08 * ax.get_ylim()[1]), ylabel="flow error (% of rms speed)")
     _label_groups(ax, recovery)
     return ax
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -61,7 +61,7 @@ def plot_policy(policy: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_xlabel("time in the class (s)")
     ax.set_title(f"with {policy['phase'].values[-1]:g} s left or more", loc="left")
     labels = policy["mode"].values
-    keys = [Patch(color=_color(mode), label=str(labels[mode])) for mode in used.tolist()]
+    keys = [Patch(color=_color(mode), label=_words(labels[mode])) for mode in used.tolist()]
     ax.legend(handles=keys, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
 
@@ -96,7 +96,9 @@ def plot_control_shares(test: xr.Dataset, ax: Axes | None = None) -> Axes:
     for at, name in enumerate(test["arm"].values):
         [line] = ax.plot(time, test["share"].values[at], label=str(name))
         ends = [[test[f"reached_{end}"].values[at]] for end in ("low", "high")]
-        ax.plot(time[-1:].repeat(2), np.ravel(ends), color=line.get_color(), lw=3.0, alpha=0.5)
+        # Next to each other, past the end.
+        place = time[-1:].repeat(2) + 0.02 * (at + 1) * (time[-1] - time[0])
+        ax.plot(place, np.ravel(ends), color=line.get_color(), lw=2.0, alpha=0.5)
     ax.set_xlabel(TIME_LABEL)
     ax.set_ylabel(f"share in {short_class(str(test.attrs['target']))}")
     ax.set_ylim(bottom=0.0)
@@ -139,7 +141,7 @@ def plot_control_run(test: xr.Dataset, ax: Axes | None = None) -> Axes:
         at = np.flatnonzero(modes[:-1] == mode)
         ax.barh(
             [row[one] for one in classes[at].tolist()], time[at + 1] - time[at], left=time[at],
-            height=0.8, label=str(labels[mode]), color=_color(mode),
+            height=0.8, label=_words(labels[mode]), color=_color(mode),
         )  # fmt: skip
     ax.set_yticks(
         range(len(visited)), [short_class(str(test["class"].values[at])) for at in visited]
@@ -148,6 +150,10 @@ def plot_control_run(test: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_xlim(time[0], time[-1])
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
+
+
+def _words(mode: Any) -> str:
+    return str(mode).replace(" x ", " × ")
 
 
 def _color(mode: int) -> tuple[float, float, float, float]:

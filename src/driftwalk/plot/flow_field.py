@@ -19,9 +19,11 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colorbar import Colorbar
 
 Field = Literal["water", "block"]
-COMPONENTS: dict[str, tuple[str, str]] = {"water": ("u", "v"), "block": ("u_block", "v_block")}
+COMPONENTS: dict[Field, tuple[str, str]] = {"water": ("u", "v"), "block": ("u_block", "v_block")}
 SPEED_LABEL = "speed (cm/s)"
 
 
@@ -84,7 +86,7 @@ def plot_flow(
     ax = style.axes_or_new(ax, layout="compressed")
     speed = np.hypot(u, v)
     filled = (flag == FLAGS["filled"]) & np.isfinite(speed)
-    top = _top(speed, filled) if speed_limit is None else 100.0 * speed_limit
+    top = 100.0 * (top_speed(flow, field) if speed_limit is None else speed_limit)
     tank = arena_of(flow, arena)
     shown, hatched = (speed, filled) if tank is None else _to_the_wall(speed, filled, flag)
     mesh = ax.pcolormesh(
@@ -99,14 +101,22 @@ def plot_flow(
             artist.set_clip_path(outline)
     label_position(ax)
     if colorbar == "beside":
-        beyond = bool(np.nanmax(speed, initial=0.0) > 1.001 * top)
-        style.add_colorbar(mesh, ax, SPEED_LABEL, extend="max" if beyond else "neither")
+        add_speed_bar(mesh, ax)
     return ax
 
 
-def _top(speed: Floats, filled: Bools) -> float:
-    """Return the largest measured speed: a guess must not make what was measured pale."""
-    known = np.isfinite(speed) & ~filled
+def add_speed_bar(mesh: ScalarMappable, axes: Axes | list[Axes]) -> Colorbar:
+    """Add the colour bar of a drawn velocity field, with a tip where filled nodes are faster."""
+    fastest = np.nanmax(np.asarray(mesh.get_array(), dtype=np.float64), initial=0.0)
+    beyond = bool(fastest > 1.001 * mesh.get_clim()[1])
+    return style.add_colorbar(mesh, axes, SPEED_LABEL, extend="max" if beyond else "neither")
+
+
+def top_speed(flow: xr.Dataset, field: Field) -> float:
+    """Return the largest measured speed [m/s]: a guess must not make what was measured pale."""
+    u, v, flag = velocity_of(flow, field)
+    speed = np.hypot(u, v) / 100.0
+    known = np.isfinite(speed) & (flag != FLAGS["filled"])
     return float(np.max(speed[known] if known.any() else np.nan_to_num(speed), initial=0.0))
 
 

@@ -139,5 +139,5 @@ def plot_data_widths(posterior: xr.Dataset, ax: Axes | None = None) -> Axes:
         xlim=(0.0, 1.1),
     )
     ax.spines[["top", "right"]].set_visible(False)
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=size)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=size)
     return ax

@@ -320,10 +320,14 @@ def plot_density_panels(
     )
     if colorbar == "beside":
         style.add_colorbar(mesh, row, DENSITY_LABEL)
+    heaped = []
     if max(abs(angle_deg[[0, -1]])) < 179.0 and limits[1] == (angle_deg[0], angle_deg[-1]):
+        heaped.append(f"angles beyond ±{angle_deg[-1]:.0f}°")
+    if limits[0][1] == length_mm[-1]:
+        heaped.append(f"steps longer than {length_mm[-1]:.3g} mm")
+    if heaped:
         style.add_footer(
-            style.figure_of(row[0]),
-            f"the outermost bins hold all angles beyond ±{angle_deg[-1]:.0f}°",
+            style.figure_of(row[0]), f"the outermost bins hold all {' and all '.join(heaped)}"
         )
     return row
 

@@ -65,11 +65,11 @@ def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.axvline(by, color=style.MUTED, lw=0.6, ls="--", label=f"deadline {by:g} s")
     target = short_class(str(found.attrs["target"]))
     ax.set(
-        xlabel=TIME_LABEL, ylabel=f"share of runs with {target}", xlim=(time[0], time[-1]),
-        ylim=(0.0, None),
+        xlabel="\n".join(filter(None, [TIME_LABEL, shared])), xlim=(time[0], time[-1]),
+        ylabel=f"share of runs with {target}", ylim=(0.0, None),
     )  # fmt: skip
-    ax.set_title(shared, loc="left")
-    ax.legend()
+    # Above: the band is anywhere.
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     ax.spines[["top", "right"]].set_visible(False)
     return ax
 
@@ -118,9 +118,7 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
             label=WORDS.get(word, word),
         )  # fmt: skip
     within = found.attrs["indifference"]
-    ax.axvspan(
-        -within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"grey: within {100 * within:g} %"
-    )
+    ax.axvspan(-within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"within {100 * within:g} %")
     words, shared = _setting_labels(found, order)
     ax.set_yticks(range(len(order)), words)
     ax.invert_yaxis()

@@ -281,7 +281,7 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
         (["--body-shape", "xx"], "squares, discs and rectangles assemble"),
         (["--body-shape", "rectangle:4x2cm", "--faces", "NSNS"], "rectangles latch as they lie"),
         (["--faces", "N,S,N"], "the types of 4 faces, in the order +x, +y, -x, -y"),
-        (["--faces", "NSNS", "--body-shape", "disc:3cm"], "leave out their types (--faces)"),
+        (["--faces", "NSNS", "--body-shape", "disc:3cm"], "leave out types of faces (--faces)"),
         (["--glued", "xx", "--blocks", "5"], "(--glued): give 4 blocks"),
         (["--seed=-1"], "--seed"),
     ],

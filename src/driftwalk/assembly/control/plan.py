@@ -115,7 +115,10 @@ def check_control(modes: Modes, wanted: Wanted) -> Wanted:
     blocks = modes.study.assembly.blocks
     if not modes.study.block.has_lattice:
         shape = modes.study.block.shape
-        raise InputError(f"control needs blocks with faces: {shape}s have no classes of shapes")
+        raise InputError(
+            f"control chooses by the shapes that squares build, and the body is '{shape}' "
+            "(`block.shape`): plan with the fit of a square block"
+        )
     if not 2 <= blocks <= CONTROL_POLICY.most_blocks:
         raise InputError(
             f"control is planned for 2 to {CONTROL_POLICY.most_blocks} blocks, got {blocks}"

@@ -25,6 +25,7 @@ from driftwalk.schema.answers.outcome_posterior import (
     UPPER_END,
 )
 from driftwalk.schema.check import build_dataset
+from driftwalk.schema.kinds.sensitivity import axis_number
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -197,7 +198,7 @@ def _reasons(
         found.append(f"regions do not cover in the self-check ({lacking}): use narrower ranges")
         return found
     for name, side, (low, _, high) in zip(problem.names, limit, ends, strict=True):
-        words = name.replace("_", " ")
+        words = axis_number(name).plain
         if side == NO_END:
             found.append(
                 f"cannot tell {words}: its interval is {(high - low) / policy.confidence:.0%} of "

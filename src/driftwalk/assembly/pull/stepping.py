@@ -26,8 +26,8 @@ class SteppingPolicy(NamedTuple):
     of 4000 runs of 4 blocks differ from those of one step by less than half of what chance makes
     of l1 and by 0.005 in KS, with the same random numbers."""
     fade: float = 1.5
-    """Distance from which all is distant, over that up to which all is near. Fixed magnets that fly
-    apart keep their energy to 2.5e-3 with 1.25, and to 5e-4 with this."""
+    """Distance from which all is distant, over that up to which all is near. The energy of
+    fixed magnets that fly apart is off by a fifth of what it is with 1.25."""
 
 
 STEPPING: Final = SteppingPolicy()

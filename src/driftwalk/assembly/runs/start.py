@@ -64,7 +64,7 @@ def _require_faces(study: Study) -> None:
             "(`assembly.latching`)"
         )
     if study.assembly.typed_faces is not None:
-        raise InputError(f"{why}: leave out their types (`assembly.faces`), or take squares")
+        raise InputError(f"{why}: leave out types of faces (`assembly.faces`), or take squares")
 
 
 def _require_glued(study: Study, cells: int) -> None:

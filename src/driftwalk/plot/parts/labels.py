@@ -83,6 +83,11 @@ def set_symbols(text: str) -> str:
     return re.sub(r"(?<!\w)([^\W\d_]_[^\W\d_])(?!\w)", r"$\1$", text)
 
 
+def model_words(name: str) -> str:
+    """Return the name of a motion model as text, "run-rest + wall" of "run_rest+wall"."""
+    return name.replace("_", "-").replace("+", " + ")
+
+
 def number_label(number: Number) -> str:
     """Return the label of an axis: words, symbol, and the unit in round brackets."""
     unit = f" ({number.reader_unit})" if number.reader_unit else ""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.parts import Answer, Estimate, Part, Row, Table, each
 from driftwalk.schema.description import Number
-from driftwalk.schema.kinds.fit import PARAMETERS
+from driftwalk.schema.kinds.sensitivity import AXIS_NUMBERS, axis_number
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def outcome_posterior_answer(found: xr.Dataset) -> Answer:
 def number_of(one: xr.Dataset) -> Number:
     """Return the name of a parameter, and its unit for a reader."""
     name, unit = (str(one[key].values) for key in ("parameter", "unit"))
-    return PARAMETERS.get(name, Number(name, unit))
+    return AXIS_NUMBERS.get(name, Number(name, unit))
 
 
 def estimate_part(one: xr.Dataset, confidence: float) -> Part:
@@ -119,7 +119,7 @@ def data_table(found: xr.Dataset) -> Table:
         ]
         for one in each(found, "data")
     ]
-    widths = [f"{name.replace('_', ' ')}: interval" for name in names]
+    widths = [f"{axis_number(name).plain}: interval" for name in names]
     columns = ["what is seen of each run", "truths held", "power", *widths, "given"]
     return Table(rows, columns, "information in each kind of data (intervals over the prior's)")
 
