@@ -226,6 +226,7 @@ def study_of_block(
     from driftwalk.model import apply_overrides
 
     known = set(study.block.model_fields_set if stated is None else stated)
+    added: dict[str, Any] = {}
     for key, (name, unit, word, way) in _BLOCK_ATTRIBUTES.items():
         if name not in recording.attrs:
             continue
@@ -236,7 +237,7 @@ def study_of_block(
         is_same = own == ours or (unit and ours is not None and abs(own - ours) <= 1e-9 * ours)
         same_fact = {"depth", "depth_m"} if word == "depth" else {key}
         if known.isdisjoint(same_fact):
-            study = apply_overrides(study, {f"block.{key}": ours if is_same else own})
+            added[f"block.{key}"] = ours if is_same else own
         elif not is_same:
             # A depth is stated by either of two keys.
             stated_by = next(one for one in _BLOCK_ATTRIBUTES if one in same_fact & known)
@@ -246,30 +247,28 @@ def study_of_block(
                 f"{f'{own} {unit}'.rstrip()}, and the study says {stated.rstrip()}: state the "
                 f"{word} once, {way}"
             )
-    return study
+    # At once: a rectangle is not valid by its shape alone.
+    return apply_overrides(study, added)
 
 
-def block_attributes(study: Study, stated: Collection[str]) -> dict[str, Any]:
-    """Return the attributes by which a recording states its block.
+def block_attributes(study: Study) -> dict[str, Any]:
+    """Return the attributes by which a recording states its block: what the study states of it.
 
     Parameters
     ----------
     study : Study
         Its [block].
-    stated : collection of str
-        The keys that are stated, as ``"section.key"``.
 
     Examples
     --------
     >>> import driftwalk as dw
-    >>> study = dw.apply_overrides(dw.Study(), {"block.mass_kg": "24g"})
-    >>> block_attributes(study, {"block.mass_kg"})
-    {'block_mass_kg': 0.024}
+    >>> block_attributes(dw.apply_overrides(dw.Study(), {"block.shape": "disc:4cm"}))
+    {'block_shape': 'disc', 'block_side_m': 0.04}
     """
     return {
         name: getattr(study.block, key)
         for key, (name, *_) in _BLOCK_ATTRIBUTES.items()
-        if f"block.{key}" in stated
+        if key in study.block.model_fields_set and getattr(study.block, key) is not None
     }
 
 

@@ -136,6 +136,30 @@ def check_trajectory(dataset: xr.Dataset) -> xr.Dataset:
     return dataset
 
 
+def block_of_study(study: object) -> dict[str, Any]:
+    """Return the attributes by which a recording states the block of a stored study.
+
+    The shape of a square and a side that is immersed are not stated: they are what else is meant.
+
+    Parameters
+    ----------
+    study : object
+        The study as it is stored, with its [block]; anything else states nothing.
+
+    Examples
+    --------
+    >>> block_of_study({"block": {"shape": "disc", "side_m": 0.03, "mass_kg": 0.0116}})
+    {'block_shape': 'disc', 'block_side_m': 0.03, 'block_mass_kg': 0.0116}
+    """
+    block = study.get("block") if isinstance(study, dict) else None
+    usual = {"shape": "square", "depth": "immersed"}
+    return {
+        f"block_{key}": block[key]
+        for key in ("shape", "side_m", "width_m", "mass_kg", "depth_m", "depth")
+        if isinstance(block, dict) and block.get(key) not in (None, usual.get(key))
+    }
+
+
 def body_names(dataset: xr.Dataset) -> list[str]:
     """Return the names of the bodies, in order."""
     return [str(name) for name in dataset["body"].values]

@@ -8,10 +8,13 @@ from typing import Any
 
 import pytest
 
+import driftwalk as dw
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.conditions import load_with_study, reading
-from driftwalk.model import Study, Tank
+from driftwalk.conditions import block_attributes, load_with_study, reading, study_for
+from driftwalk.core.errors import InputError
+from driftwalk.model import Study, Tank, apply_overrides
 from driftwalk.schema import build_trajectory
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 
 @pytest.fixture
@@ -77,3 +80,28 @@ def test_recording_is_read_as_the_study_says(tmp_path: Path) -> None:
     assert trajectory["x"].values[:, 0].tolist() == [0.01 * k for k in range(10)]
     assert trajectory["y"].values[-1, 0] == 0.18
     assert Tank.from_arena(json.loads(trajectory.attrs["arena"])) == study.tank
+
+
+BODIES = ("square", "disc:4cm", "rectangle:4x2cm", "xx")
+
+
+@pytest.mark.parametrize("shape", BODIES)
+def test_a_recording_states_all_that_was_stated_of_its_body(shape: str) -> None:
+    stated = apply_overrides(Study(), {"block.shape": shape, "block.mass_kg": "24g"})
+    recording = build_trajectory([0.0, 1.0], [0.0, 0.01], [0.0, 0.01])
+    recording.attrs.update(block_attributes(stated))
+    assert study_for([recording]).block == stated.block
+
+
+@pytest.mark.parametrize("shape", BODIES[1:3])
+def test_a_simulation_states_its_body(shape: str, tmp_path: Path) -> None:
+    stated = apply_overrides(
+        Study(simulation={"duration_s": 1.0}),
+        {"block.shape": shape, "block.mass_kg": "24g", "block.depth_m": "1cm"},
+    )
+    file = tmp_path / "simulated.nc"
+    file.write_bytes(netcdf_bytes(dw.simulate(stated, dw.uniform_flow(0.0, 0.0))))
+    recording = dw.load(file)
+    assert study_for([recording]).block == stated.block
+    with pytest.raises(InputError, match=r"of a block of mass 0\.024 kg, and the study says 0\.03"):
+        study_for([recording], Study(block={"mass_kg": 0.03}))

@@ -40,7 +40,7 @@ def read(
     from driftwalk.conditions import block_attributes
     from driftwalk.record import save_trajectory
 
-    stated = block_attributes(given.study(), given.overrides)
+    stated = block_attributes(given.study())
     trajectory = how.load(recording, side=stated.get("block_side_m"))
     if stated.keys() & {"block_depth", "block_depth_m"}:
         # A depth is a word or a length: the one that is stated replaces the other.

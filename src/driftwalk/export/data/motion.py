@@ -13,8 +13,8 @@ from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, run_file, run_files, state_of
 from driftwalk.core.text.json_text import read_json
-from driftwalk.core.text.toml_text import parse_toml
 from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
+from driftwalk.schema.trajectory import block_of_study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,7 +73,7 @@ def find_motions(source: Path, *, replicate: int | None = None) -> list[Motion]:
             f"{source} holds no motion: neither a recording (recording.nc) nor runs of blocks "
             "(path.nc); give the file of a recording or a simulation"
         )
-    size = _size_of_run(source)
+    size = _block_of_run(source)
     found = [motion for file in files for motion in _of_file(file, replicate)]
     for motion in found:
         motion.recording.attrs = size | motion.recording.attrs
@@ -110,7 +110,6 @@ def _of_worlds(file: Path, kind: str, replicate: int | None) -> Iterator[Motion]
         raise InputError(
             f"{file}: there is no {dimension} {replicate}: it holds {known[0]} to {known[-1]}"
         )
-    size = _size_of_simulation(stored)
     for number in known if replicate is None else [replicate]:
         recording = (
             path_recording(stored, run=number)
@@ -122,18 +121,10 @@ def _of_worlds(file: Path, kind: str, replicate: int | None) -> Iterator[Motion]
                 ("time", "body"),
                 stored["assembly"].sel(run=number).transpose("time", "block").values,
             )
-        recording.attrs.update(size)
         yield Motion(f"{dimension}_{number}", recording)
 
 
-def _size_of_simulation(stored: xr.Dataset) -> dict[str, Any]:
-    """Return the attributes of shape and size of the block that was simulated; none of others."""
-    if "block_side_m" in stored.attrs or "model" in stored.attrs or "study" not in stored.attrs:
-        return {}
-    return _size_of_study(parse_toml(str(stored.attrs["study"])))
-
-
-def _size_of_run(folder: Path) -> dict[str, Any]:
+def _block_of_run(folder: Path) -> dict[str, Any]:
     path = run_file(folder, MANIFEST_FILE)
     manifest = {} if path is None else read_json(path)
     if not isinstance(manifest, dict):
@@ -141,17 +132,7 @@ def _size_of_run(folder: Path) -> dict[str, Any]:
     specification = manifest.get("specification")
     if isinstance(specification, dict) and specification.get("model"):
         return {}
-    return _size_of_study(manifest.get("study"))
-
-
-def _size_of_study(study: object) -> dict[str, Any]:
-    block = study.get("block") if isinstance(study, dict) else None
-    if not isinstance(block, dict):
-        return {}
-    known = {key: block[key] for key in ("side_m", "width_m") if block.get(key) is not None}
-    if block.get("shape", "square") != "square":
-        known["shape"] = block["shape"]
-    return {f"block_{key}": value for key, value in known.items()}
+    return block_of_study(manifest.get("study"))
 
 
 def frame_rate(recording: xr.Dataset) -> float | None:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.text.toml_text import parse_toml
 from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
 from driftwalk.schema.check import check_contents, kind_name
 from driftwalk.schema.kinds import KINDS
 from driftwalk.schema.stores.netcdf import MAGIC, kind_of_file, open_netcdf
-from driftwalk.schema.trajectory import POSE
+from driftwalk.schema.trajectory import POSE, block_of_study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,12 +68,14 @@ class DriftwalkLoader:
 
 
 def _replicate(simulation: xr.Dataset, replicate: int) -> xr.Dataset:
-    """Return one simulated world as a recording; of the attributes the tank stays."""
+    """Return one simulated world as a recording; of the attributes tank and block stay."""
     count = simulation.sizes["replicate"]
     if not 0 <= replicate < count:
         raise InputError(f"no `replicate` {replicate}: the simulation has {count}, counted from 0")
     chosen = simulation[list(POSE)].isel(replicate=replicate, drop=True)
     kept = {name: simulation.attrs[name] for name in ("arena",) if name in simulation.attrs}
+    if "model" not in simulation.attrs and "study" in simulation.attrs:
+        kept |= block_of_study(parse_toml(str(simulation.attrs["study"])))
     version = KINDS["trajectory"].version
     chosen.attrs = {"kind": "trajectory", "schema_version": version, "simulated": "yes", **kept}
     return chosen
