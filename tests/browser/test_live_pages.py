@@ -328,12 +328,17 @@ def test_bodies_of_a_motion_model(
         until_tank(page, "frames", 1)
         assert canvas.get_attribute("data-blocks") == "4"
         assert canvas.get_attribute("aria-label") == "The tank: bodies and their trails"
-        early = drawn_share(pixels(canvas))
         names = [knob.get_attribute("name") for knob in page.locator("input[type=range]").all()]
         wanted = [f"parameter:{name}" for name in ("speed", "rotational_diffusion", "turn_rate")]
         assert names == [*wanted, "bodies", "speed"]
-        until_tank(page, "frames", 150)
-        assert drawn_share(pixels(canvas)) > early
+        page.click("[data-action=pause]")
+        page.wait_for_selector("[data-action=run]")
+        page.click("[data-action=restart]")
+        page.wait_for_selector(".tank-canvas[data-time='0']")
+        alone = drawn_share(pixels(canvas))
+        page.click("[data-action=run]")
+        until_tank(page, "time", 2.0)
+        assert drawn_share(pixels(canvas)) > alone
         turn(page, '"parameter:speed"', 0.7)
         expect(page.locator("label", has_text="speed").first).to_contain_text("cm/s")
         turn(page, "bodies", 0.9)
