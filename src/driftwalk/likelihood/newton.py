@@ -172,8 +172,9 @@ class ModeSearch:
 
     def find(self, start: Point, weights: Weights, *, held: Held = FROM_AFAR) -> Mode | None:
         """Return the mode; None where the search breaks down, as under a wrong law it may."""
-        point, used, converged = start, 0, False
-        covariance = np.zeros((0, 0))
+        point, used, converged, settled = start, 0, False, False
+        known = np.zeros((0, 0))
+        pooled = any(one.pooled > 1 for one in self.passes.series)
         deviance = ahead = math.inf
         last = np.zeros(start.coefficients.size + 1 + len(start.extras))
         try:
@@ -184,12 +185,14 @@ class ModeSearch:
                     left = [one for one in left if one <= drag + len(point.noises)]
                     # Derivatives by the noises take a pass each: none where all of them are held.
                     others = range(drag + 1, drag + 1 + len(point.extras))
-                    moving = "without" if set(others) <= set(left) else "with"
+                    moving = "without" if settled or set(others) <= set(left) else "with"
+                    left = list(others) if settled else left
                     sums = self.passes.sums(point, noise=moving)
                     sums = _of_all(self.prior.add(sums, point, weights), last.size)
                     self.passed(work_of_pass(self.passes))
                     used, deviance = sums.used, sums.deviance
                     covariance = inverse(sums.information)
+                    known = known if settled else covariance
                     whole = newton_step(sums, covariance, held=left)
                     step = limited(whole, drag, list(point.opened))
                     step = last = damped(step, last, sums.information)
@@ -206,12 +209,15 @@ class ModeSearch:
                     of_flow = float(np.sqrt((moves[:drag] ** 2).mean()))
                     near = max(float(moves[drag:].max()), of_flow)
                     gain = 0.5 * float(sums.score @ covariance @ sums.score)
-                    if len(left) == 0 and near < self.close and gain < self.close_nats:
+                    free = settled or len(left) == 0
+                    if free and near < self.close and gain < self.close_nats:
                         converged = True
                         break
+                    # Of a fast camera the flow is then brought to its end without the noises.
+                    settled = pooled and free and near < self.close
         except BREAKDOWN:
             return None
-        return Mode(point, weights, covariance, used, index + 1, converged, deviance, ahead)
+        return Mode(point, weights, known, used, index + 1, converged, deviance, ahead)
 
     def find_from_afar(self, start: Point, weights: Weights) -> Mode | None:
         """Return the mode, of long recordings by way of the mode of pieces of them."""
