@@ -292,9 +292,7 @@ def _bodies(
         found = {"": middle}
     if column is None or codes is None:
         return list(found.values()), notes
-    one = next(iter(found.values()))
-    labels = table.labels[column]
-    return split_bodies(codes, labels, clock=clock, x=one.x, y=one.y, theta=one.theta), notes
+    return split_bodies(next(iter(found.values())), codes, table.labels[column]), notes
 
 
 def _body(
