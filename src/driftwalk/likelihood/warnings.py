@@ -137,13 +137,12 @@ def _on_the_lever(facts: Mapping[str, Any], most_m: float) -> Iterator[str]:
 def _on_added_noise(facts: Mapping[str, Any]) -> Iterator[str]:
     position = facts.get("added_position_noise_m", 0.0)
     turning = facts.get("added_orientation_noise_rad", 0.0) if facts["angle"] == "state" else 0.0
-    amounts = [f"{1e3 * position:.2g} mm"] if position else []
-    amounts += [f"{math.degrees(turning):.2g}°"] if turning else []
-    if amounts:
+    if position:
+        also = f" and {math.degrees(turning):.2g}°" if turning else ""
         yield (
-            f"the recording has hardly any noise of a camera: {' and '.join(amounts)} were added, "
-            "as the filter's approximations of the motion are no more exact; the noise of the "
-            "answer contains them"
+            f"the recording has hardly any noise of a camera: {1e3 * position:.2g} mm{also} were "
+            "added, as the filter's approximations of the motion are no more exact; the noise of "
+            "the answer contains them"
         )
 
 

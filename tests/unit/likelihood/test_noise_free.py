@@ -55,6 +55,19 @@ def test_a_motion_too_rough_to_tell_stays_as_it_is() -> None:
     assert with_least_noise(track, side=SIDE, number=0)[1] == (0.0, 0.0)
 
 
+def test_a_column_that_is_only_filled_stays_so() -> None:
+    track = walk(0.0, 0.0, seed=1)._replace(theta=np.full(3000, 0.3))
+    found, added = with_least_noise(track, side=SIDE, number=0)
+    assert added.position_noise_m > 0.0
+    assert added.orientation_noise_rad == 0.0
+    assert (found.theta == 0.3).all()
+
+
+def test_a_seen_track_keeps_an_exact_orientation() -> None:
+    track = walk(3e-4, 0.0, seed=1)
+    assert with_least_noise(track, side=SIDE, number=0)[0] is track
+
+
 @pytest.mark.slow
 def test_a_recording_without_noise_is_explained() -> None:
     """Of the other engine. As it is: σ_F 4 % low, beyond its interval, and condemned."""

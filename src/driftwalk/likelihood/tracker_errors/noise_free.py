@@ -41,7 +41,7 @@ class AddedNoise(NamedTuple):
 
 
 def with_least_noise(track: Track, *, side: float, number: int) -> tuple[Track, AddedNoise]:
-    """Return a track with white noise added where it has hardly any, and how much.
+    """Return a track with white noise added where its positions have hardly any, and how much.
 
     Parameters
     ----------
@@ -63,20 +63,22 @@ def with_least_noise(track: Track, *, side: float, number: int) -> tuple[Track, 
     True
     """
     own = estimate_tracking_noise(track)
-    added = AddedNoise(
-        _lacking(
-            own.position_noise_m,
-            own.position_noise_standard_error_m,
-            LEAST_NOISE.position_sides * side,
-        ),
-        _lacking(
-            own.orientation_noise_rad,
-            own.orientation_noise_standard_error_rad,
-            LEAST_NOISE.orientation_rad,
-        ),
+    position = _lacking(
+        own.position_noise_m,
+        own.position_noise_standard_error_m,
+        LEAST_NOISE.position_sides * side,
     )
-    if not any(added):
-        return track, added
+    if not position:
+        return track, AddedNoise(0.0, 0.0)
+    known = track.theta[np.isfinite(track.theta)]
+    # A tracker that only fills its column has no orientation.
+    turns = known.size > 0 and np.ptp(known) > 0.0
+    orientation = _lacking(
+        own.orientation_noise_rad,
+        own.orientation_noise_standard_error_rad,
+        LEAST_NOISE.orientation_rad if turns else 0.0,
+    )
+    added = AddedNoise(position, orientation)
     noise = np.random.default_rng(number).standard_normal((3, track.time.size))
     x, y = (
         at + added.position_noise_m * one
