@@ -8,32 +8,19 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Final
 
-from driftwalk.record.vocabulary import (
-    ALLOWED,
-    DIRECTIONS,
-    IMAGE_WORDS,
-    INNER,
-    NO_POSITION,
-    NO_UNIT,
-    ROOTS,
-    TIME_WORDS,
-    UNITS,
-    WITH_ID,
-    words,
-)
+from driftwalk.record.vocabulary import ALLOWED, IMAGE_WORDS, NO_UNIT, ROOTS, UNITS, words
 
 QUATERNION: Final = ("qx", "qy", "qz", "qw")
 OF_BODY: Final = ("x", "y", "z", "theta", *QUATERNION, "lon", "lat", "confidence")
 """Quantities that a table may have once for each body."""
-# Words before x, y, z or w that make them a part of a quaternion: "orientation.x", "q_w".
-_QUATERNION_WORDS = words("q quat quaternion orientation rot rotation")
-_FRAME_WORDS = words("number no index stamp col num")
-# Of several columns of a quantity, one with such a word comes before one with any other.
-_FIRST = words(
-    "t time timestamp datetime date frame frames framenumber frameno frameid frameindex body "
-    "id track trackid robot robotid individual animal name particle agent subject fish mouse "
-    "rat bot particleid agentid objectid tagid uid tracklet"
-)
+_QUATERNION_WORDS: Final = words("quaternion")
+_FRAME_WORDS: Final = words("frame")
+_FIRST: Final = words("first")
+_WITH_ID: Final = words("with_id")
+_INNER: Final = words("inner")
+_NO_POSITION: Final = words("no_position")
+_DIRECTIONS: Final = words("directions")
+_TIME_WORDS: Final = words("time")
 _P = re.compile(r"[pP]\d*")
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 _JOINED = re.compile(r"(position|cent(?:er|re|roid)|head|nose|tail)([xy])\b", re.IGNORECASE)
@@ -108,13 +95,13 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     rest = [token for position, token in enumerate(tokens) if position != index]
     lower = {token.lower() for token in rest}
     root = tokens[index].lower()
-    allowed = IMAGE_WORDS | TIME_WORDS | {"id"} | (WITH_ID if root == "id" else frozenset())
+    allowed = IMAGE_WORDS | _TIME_WORDS | {"id"} | (_WITH_ID if root == "id" else frozenset())
     allowed |= {word.lower() for word in words_of(text.rpartition(": ")[0])}  # "Latest: Time"
     if quantity not in OF_BODY and lower - allowed - ({"date"} if quantity == "t" else set()):
         return None
-    if quantity in OF_BODY and lower & NO_POSITION:
+    if quantity in OF_BODY and lower & _NO_POSITION:
         return None
-    if quantity in ("x", "y", "z") and lower & DIRECTIONS and not unit:
+    if quantity in ("x", "y", "z") and lower & _DIRECTIONS and not unit:
         return None
     if (unit and unit not in ALLOWED[quantity]) or (unknown and not ALLOWED[quantity]):
         return None
@@ -162,7 +149,7 @@ def _inner_unit(tokens: list[str], index: int, quantity: str) -> int | None:
     for at, token in enumerate(tokens):
         word = token.lower()
         after = word == "m" and at == index + 1 < len(tokens) - 1
-        if (word in INNER or after) and UNITS[word] in ALLOWED[quantity]:
+        if (word in _INNER or after) and UNITS[word] in ALLOWED[quantity]:
             return at
     return None
 

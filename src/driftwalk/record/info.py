@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -17,6 +17,10 @@ from driftwalk.schema import Track, body_names, body_track, check_trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+_STATED: Final = ("arena", "arena_found", "origin_shift_m")
+_NUMBERS: Final = ("position_quantum_m", "metres_per_pixel")
 
 
 def describe(trajectory: xr.Dataset) -> dict[str, Any]:
@@ -49,15 +53,9 @@ def describe(trajectory: xr.Dataset) -> dict[str, Any]:
     counts = _json_attribute(attrs, "counts", {})
     warnings = counts.pop("warnings", [])
     return {
-        "source": attrs.get("source"),
-        "format": attrs.get("format"),
-        "y_axis": attrs.get("y_axis"),
-        "time_origin": attrs.get("time_origin"),
-        "arena": _json_attribute(attrs, "arena", None),
-        "arena_found": _json_attribute(attrs, "arena_found", None),
-        "origin_shift_m": _json_attribute(attrs, "origin_shift_m", None),
-        "position_quantum_m": json_value(float(attrs.get("position_quantum_m", math.nan))),
-        "metres_per_pixel": json_value(float(attrs.get("metres_per_pixel", math.nan))),
+        **{name: attrs.get(name) for name in ("source", "format", "y_axis", "time_origin")},
+        **{name: _json_attribute(attrs, name, None) for name in _STATED},
+        **{name: json_value(float(attrs.get(name, math.nan))) for name in _NUMBERS},
         "tracking": _tracking(attrs),
         "columns": _json_attribute(attrs, "columns_read", []),
         "counts": counts,

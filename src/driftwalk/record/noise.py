@@ -294,12 +294,8 @@ def _lag_sums(time: Array, starts: Integers, values: Array, good: Bools) -> Arra
         both = near & good[:, first] & good[:, second]
         product = values[:, first] * values[:, second]
         count = both.sum(axis=0)
-        sums[lag] = (
-            (noise * count).sum(),
-            (process * count).sum(),
-            (product * both).sum(),
-            count.sum(),
-        )
+        terms = (noise * count, process * count, product * both, count)
+        sums[lag] = [term.sum() for term in terms]
     return sums
 
 

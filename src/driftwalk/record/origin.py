@@ -13,7 +13,7 @@ from driftwalk.core.errors import FormatError, InputError, naming_its_file
 from driftwalk.core.files.bounded import text_of_name
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN, find_loader, loaders, nearest_table
-from driftwalk.record.tables.in_memory import MemorySource, table_in_memory
+from driftwalk.record.tables.in_memory import table_in_memory
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import encoding_notes, read_head
 from driftwalk.schema.stores.netcdf import kind_of_file
@@ -79,7 +79,13 @@ def origin_of(
     """
     if not (isinstance(data, str) or hasattr(data, "__fspath__")):
         table = table_in_memory(data)
-        return _of_table(table, options, format=format, replicate=replicate)
+        stated = {name: getattr(options, name) for name in _OF_FILES}
+        stated |= {"format": format, "replicate": replicate}
+        given = [name for name, value in stated.items() if value is not None]
+        if given:
+            raise InputError(f"{table.what}: `{given[0]}` is about a file: leave it out")
+        name = table.what.removeprefix("the ")
+        return Origin(table.what, name, IN_MEMORY, partial(recording_of, table))
     path = Path(data)
     if replicate is not None and kind_of_file(path) != "simulation":
         raise InputError(f"{path}: no simulation, so it has no replicates: omit `replicate`")
@@ -92,21 +98,4 @@ def origin_of(
         read=partial(naming_its_file(loader.read), path),
         path=path,
         guessed=format is None and loader.name == PLAIN,
-    )
-
-
-def _of_table(
-    table: MemorySource, options: ReadOptions, *, format: str | None, replicate: int | None
-) -> Origin:
-    given = [name for name in _OF_FILES if getattr(options, name) is not None]
-    given += [
-        name for name, value in (("format", format), ("replicate", replicate)) if value is not None
-    ]
-    if given:
-        raise InputError(f"{table.what}: `{given[0]}` is about a file: leave it out")
-    return Origin(
-        where=table.what,
-        name=table.what.removeprefix("the "),
-        format=IN_MEMORY,
-        read=partial(recording_of, table),
     )

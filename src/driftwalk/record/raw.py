@@ -16,15 +16,9 @@ import numpy as np
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.record.vocabulary import words
 
-NAMELESS = words("#N/A NaN nan NAN NA N/A null NULL None none -nan") | {""}
+NAMELESS: Final = words("nameless") | {""}
 """Words for a missing name of a body."""
-
-MISSING = NAMELESS | words(
-    "- -- --- . .. n/a n.a. missing Missing MISSING <NA> NaT nil 1.#QNAN -1.#QNAN 1.#IND "
-    "-1.#IND 1.#QNB 1.#SNAN nan(ind) -nan(ind) nan(snan) -nan(snan) nanq nans #DIV/0! #VALUE! "
-    "#REF! #NUM! #NAME? #NULL! #NV #NV! #WERT! #N/D na nd ND n.d. -NaN NaN() — – * ** *** "
-    "undefined invalid lost"
-)
+MISSING: Final = NAMELESS | words("missing")
 """Words that trackers, spreadsheets and compilers write for a missing number."""
 
 

@@ -110,25 +110,17 @@ def name_the_body(columns: list[str]) -> str:
     return f"the column {shown} could name the body: add {argument} or the like"
 
 
-def split_bodies(
-    codes: Codes,
-    labels: Sequence[str],
-    *,
-    clock: Array,
-    x: Array,
-    y: Array,
-    theta: Array | None = None,
-) -> list[RawBody]:
+def split_bodies(rows: RawBody, codes: Codes, labels: Sequence[str]) -> list[RawBody]:
     """Return one body per label, each with its rows in the file's order.
 
     Parameters
     ----------
+    rows : RawBody
+        The rows of all bodies.
     codes : array of int32, shape (n,)
         Index of each row's body in `labels`.
     labels : sequence of str
         Names of the bodies.
-    clock, x, y, theta : array, shape (n,)
-        The rows.
 
     Raises
     ------
@@ -136,9 +128,8 @@ def split_bodies(
         When there are more labels than bodies are read.
     """
     refuse_many_bodies(labels)
-    rows = RawBody(labels[0] if labels else "", clock, x, y, theta)
     if len(labels) == 1:
-        return [rows]
+        return [replace(rows, name=labels[0])]
     places = zip(labels, rows_of_bodies(codes, number=len(labels)), strict=True)
     return [replace(rows.take(at), name=name) for name, at in places if at.size]
 
@@ -171,6 +162,13 @@ def number_codes(values: Array) -> tuple[Codes, list[str]]:
     numbers, codes = np.unique(values, return_inverse=True)
     names = [str(int(number)) if number % 1 == 0 else f"{number:g}" for number in numbers.tolist()]
     return codes.ravel().astype(np.int32), names
+
+
+def split_numbered(rows: RawBody, numbers: Array) -> tuple[list[RawBody], int]:
+    """Return one body per number that names it, and how many rows have none and are left out."""
+    named = np.isfinite(numbers)
+    codes, names = number_codes(numbers[named])
+    return split_bodies(rows.take(named), codes, names), int((~named).sum())
 
 
 def codes_in_arenas(

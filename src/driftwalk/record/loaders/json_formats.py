@@ -19,8 +19,7 @@ from driftwalk.record.vocabulary import words
 
 _MOST_NUMBERS: Final = 16
 """Length of a list up to which each of its numbers becomes a column; chosen by hand."""
-_POINTS: Final = words("position pos point xy xyz center centre centroid coordinates location")
-"""Names of lists that hold x and y."""
+_POINTS: Final = words("points")
 
 KEYS = ("x", "y", "theta", "t")
 

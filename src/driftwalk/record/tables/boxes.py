@@ -27,8 +27,8 @@ _CORNERS: Final = ("x1", "y1", "x2", "y2")
 _QUAD: Final = tuple(f"{axis}{corner}" for corner in range(1, 5) for axis in "xy")
 _FROM_ZERO: Final = {"x0": "x1", "y0": "y1", "x1": "x2", "y1": "y2"}
 _OF_QUAD: Final = re.compile(r"(?:tag)?(?:c|corner|p|pt)([0-4])([xy])")
-_CENTRE: Final = words("cx cy xc yc center centre centroid mitte centro")
-_CLASSES: Final = words("class cls classid classname label category")
+_CENTRE: Final = words("centre")
+_CLASSES: Final = words("classes")
 
 
 class BoxPolicy(NamedTuple):

@@ -40,11 +40,7 @@ NO_CLOCK_OF_EACH = (
 )
 _FULL_TURN: Final = 6.3
 """A full turn in radians, with room for rounding."""
-_FLAGS: Final = {
-    **dict.fromkeys(words("true t yes y ja oui si sí vrai wahr ok"), 1.0),
-    **dict.fromkeys(words("false f no n nein non faux falsch lost missing invalid bad"), 0.0),
-}
-"""Words of a column that says whether the body was seen."""
+_FLAGS: Final = {**dict.fromkeys(words("yes"), 1.0), **dict.fromkeys(words("no"), 0.0)}
 NAME_THE_CLOCK = (
     'no column is known to hold times or frames: name it with `columns={"t": "NAME:s"}` or '
     '`columns={"frame": "NAME"}`; if there is none, give `frame_rate`, and every row counts as '
@@ -296,9 +292,7 @@ def _bodies(
         found = {"": middle}
     if column is None or codes is None:
         return list(found.values()), notes
-    one = next(iter(found.values()))
-    labels = table.labels[column]
-    return split_bodies(codes, labels, clock=clock, x=one.x, y=one.y, theta=one.theta), notes
+    return split_bodies(next(iter(found.values())), codes, table.labels[column]), notes
 
 
 def _body(

@@ -6,6 +6,8 @@ All hold the same circle of 8 cm, at 3 rad/s and 25 Hz, in their own names, unit
 from __future__ import annotations
 
 import json
+import tomllib
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,7 @@ import numpy as np
 import pytest
 
 from driftwalk.core.errors import InputError
-from driftwalk.record import describe, load
+from driftwalk.record import describe, load, vocabulary
 from driftwalk.schema import body_names, body_track
 
 FILES = Path(__file__).parents[3] / "data" / "foreign"
@@ -447,3 +449,11 @@ def test_centre_and_head_are_one_body(tmp_path: Path, head: str) -> None:
     dataset = load(table(tmp_path, head, row), length_unit="m")
     check(dataset)
     np.testing.assert_allclose(np.unwrap(body_track(dataset).theta), ANGLE, atol=1e-9)
+
+
+@pytest.mark.parametrize("table", ["quantities", "units", "sides_of_a_box"])
+def test_a_word_has_one_meaning(table: str) -> None:
+    text = (Path(vocabulary.__file__).with_suffix(".toml")).read_text(encoding="utf-8")
+    found = [word for words in tomllib.loads(text)[table].values() for word in words.split()]
+    assert found == [word.lower() for word in found]
+    assert [word for word, times in Counter(found).items() if times > 1] == []

@@ -127,14 +127,7 @@ class SleapCsvLoader:
         raw = recording_of_poses(own, read_point, chosen, clock, options, usual=USUAL)
         if track is not None:
             (rows,) = raw.bodies
-            raw.bodies = split_bodies(
-                table.codes[track],
-                table.labels[track],
-                clock=rows.clock,
-                x=rows.x,
-                y=rows.y,
-                theta=rows.theta,
-            )
+            raw.bodies = split_bodies(rows, table.codes[track], table.labels[track])
             for one in raw.bodies:
                 if not one.name and np.unique(one.clock).size < one.clock.size:
                     raise FormatError(

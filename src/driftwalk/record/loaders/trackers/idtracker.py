@@ -272,25 +272,23 @@ def _attributes(path: Path) -> dict[str, Any]:
 
 
 def _of_tidy(path: Path, options: ReadOptions) -> RawRecording:
-    names = first_row(path)
-    if names != TIDY:
+    if first_row(path) != TIDY:
         raise FormatError(f"the columns are not {','.join(TIDY)}", line=1)
-    table = read_table(path, TableLayout(",", names, 1, (0, 1, 2, 3, 4, 5)))
-    frame, time, individual, x, y, known = (table.numbers[at] for at in range(6))
+    frame, time, individual, x, y, known = _columns(path).values()
     if not np.isfinite(individual).all():
         raise FormatError("a row names no individual")
     attributes = _attributes(path.with_name(TIDY_ATTRIBUTES))
     rate = _rate(attributes)
     by_frames = rate is not None or options.frame_rate_hz is not None
     notes = _unit_note(attributes)
+    rows = RawBody("", frame if by_frames else time, x, y)
     if options.min_confidence is not None:
-        rows = RawBody("", frame, x, y)
         notes.append(_drop_unsure([rows], known[:, None], options.min_confidence))
     codes, _ = number_codes(individual)
     count = int(codes.max()) + 1
     labels = _labels(attributes.get("identities_labels"), count)
     return RawRecording(
-        split_bodies(codes, labels, clock=frame if by_frames else time, x=x, y=y),
+        split_bodies(rows, codes, labels),
         clock_unit="frame" if by_frames else "s",
         length_unit="px",
         frame_rate_hz=rate,

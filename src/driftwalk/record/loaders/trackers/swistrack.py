@@ -147,14 +147,9 @@ class SwisTrackParticlesLoader:
         order = order_in_frame(numbers[0])
         count = int(order.max()) + 1
         timed = options.frame_rate_hz is None
-        bodies = split_bodies(
-            order,
-            [str(index) for index in range(count)],
-            clock=_times(table) if timed else numbers[0],
-            x=numbers[4 if world else 2],
-            y=numbers[5 if world else 3],
-            theta=numbers[7],
-        )
+        clock = _times(table) if timed else numbers[0]
+        x, y, theta = (numbers[at] for at in ((4, 5, 7) if world else (2, 3, 7)))
+        bodies = split_bodies(RawBody("", clock, x, y, theta), order, [*map(str, range(count))])
         note = (
             "particles.csv holds no identities: bodies are distinguished by their order in a frame"
         )
@@ -201,14 +196,9 @@ class SwisTrackNmeaLoader:
         # Some senders give every particle the same id: then only their order tells them apart.
         repeated = np.unique(np.stack([frame, ids]), axis=1).shape[1] < frame.size
         names = [str(index) for index in (range(int(order.max()) + 1) if repeated else labels)]
-        bodies = split_bodies(
-            order if repeated else codes.astype(np.int32),
-            names,
-            clock=frame,
-            x=world_x if world else image_x,
-            y=world_y if world else image_y,
-            theta=theta,
-        )
+        x, y = (world_x, world_y) if world else (image_x, image_y)
+        rows = RawBody("", frame, x, y, theta)
+        bodies = split_bodies(rows, order if repeated else codes.astype(np.int32), names)
         note = "ids repeat within a frame: bodies are distinguished by their order in the frame"
         note = note if repeated else ""
         return _recording(bodies, "frame", world=world, note=note)

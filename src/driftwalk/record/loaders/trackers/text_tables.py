@@ -101,7 +101,7 @@ def _stacked(path: Path, names: list[str], skip: int) -> tuple[list[RawBody], Ar
     targets = [f"Ind{label}" for label in table.labels[3]]
     codes, labels = codes_in_arenas((table.codes[2], table.labels[2]), (table.codes[3], targets))
     frame, time, x, y = (table.numbers[column] for column in (0, 1, 4, 5))
-    bodies = split_bodies(codes, labels, clock=frame, x=x, y=y)
+    bodies = split_bodies(RawBody("", frame, x, y), codes, labels)
     return bodies, frame.copy(), time
 
 
@@ -211,7 +211,7 @@ class ToxTracLoader:
         if not (np.isfinite(arena) & np.isfinite(track)).all():
             raise FormatError("a row names no arena or no track")
         codes, labels = codes_in_arenas(number_codes(arena), number_codes(track))
-        bodies = split_bodies(codes, labels, clock=clock, x=x, y=y)
+        bodies = split_bodies(RawBody("", clock, x, y), codes, labels)
         # Label 0 is a position that was predicted, not seen.
         predicted = int((label == 0.0).sum())
         return RawRecording(

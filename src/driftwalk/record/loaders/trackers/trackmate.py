@@ -15,7 +15,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
+from driftwalk.record.cleaning.several_bodies import split_numbered
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.raw import (
     LENGTH_UNITS,
@@ -64,12 +64,9 @@ class TrackMateLoader:
         layout = TableLayout(",", names, header, tuple(sorted(wanted.values())))
         table = read_table(path, layout)
         track, x, y, time = (table.numbers[place] for place in wanted.values())
-        inside = np.isfinite(track)
-        if not inside.any():
+        bodies, outside = split_numbered(RawBody("", time, x, y), track)
+        if not bodies:
             raise FormatError("no spot belongs to a track")
-        codes, labels = number_codes(track[inside])
-        bodies = split_bodies(codes, labels, clock=time[inside], x=x[inside], y=y[inside])
-        outside = int((~inside).sum())
         return RawRecording(
             bodies,
             clock_unit=clock_unit,

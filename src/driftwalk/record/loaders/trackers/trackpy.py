@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
-from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.cleaning.several_bodies import split_numbered
+from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
 from driftwalk.record.stores.pandas_frame import Frame, frame_in
 from driftwalk.record.text import read_table
@@ -46,16 +46,12 @@ class TrackpyLoader:
         """Read every particle; rows that are linked to none are left out."""
         is_hdf5 = file_start(path) == HDF5
         columns = _of_store(path) if is_hdf5 else _of_csv(path)
-        linked = np.isfinite(columns["particle"])
-        rows = linked.size
-        notes = []
-        if not linked.all():
-            columns = {name: values[linked] for name, values in columns.items()}
-            notes = [f"features that are linked to no particle, and left out: {(~linked).sum()}"]
-        codes, names = number_codes(columns["particle"])
-        if not names:
+        features = RawBody("", columns["frame"], columns["x"], columns["y"])
+        bodies, loose = split_numbered(features, columns["particle"])
+        if not bodies:
             raise FormatError("no feature is linked to a particle")
-        bodies = split_bodies(codes, names, clock=columns["frame"], x=columns["x"], y=columns["y"])
+        note = f"features that are linked to no particle, and left out: {loose}"
+        rows, notes = features.clock.size, [note] if loose else []
         return RawRecording(bodies, length_unit="px", rows=rows, notes=notes)
 
 
