@@ -89,6 +89,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
+    # The interpreter's last collection passes over what is frozen, and nanobind calls that a leak.
+    gc.unfreeze()
     if _RESULTS in config.stash:
         shutil.rmtree(config.stash[_RESULTS], ignore_errors=True)
         os.environ.pop(SHARED, None)
