@@ -12,6 +12,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Annotated, Any, Final, NamedTuple
 
 import typer
@@ -93,6 +94,7 @@ class LazyGroup(HelpGroup):
             raise PastTyper from error
 
 
+@cache
 def load_command(name: str) -> Any:
     """Import a command and return it in the form that the group runs."""
     import importlib
@@ -155,6 +157,11 @@ def driftwalk(
         typer.echo(ctx.get_help())
 
 
+@cache
+def _commands() -> Any:
+    return to_click_command(app)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
@@ -174,9 +181,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     driftwalk 0.1.0
     0
     """
-    command = to_click_command(app)
     try:
-        code = command.main(
+        code = _commands().main(
             args=list(sys.argv[1:] if arguments is None else arguments),
             prog_name="driftwalk",
             standalone_mode=False,
