@@ -12,7 +12,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import lru_cache
 from typing import Annotated, Any, Final, NamedTuple
 
 import typer
@@ -94,7 +94,6 @@ class LazyGroup(HelpGroup):
             raise PastTyper from error
 
 
-@cache
 def load_command(name: str) -> Any:
     """Import a command and return it in the form that the group runs."""
     import importlib
@@ -110,6 +109,7 @@ def _stand_in() -> None:
     """Represent a command in the list of commands."""
 
 
+@lru_cache(maxsize=64)
 def _one_command_app(name: str, function: Callable[..., Any]) -> Any:
     app = typer.Typer(add_completion=False)
     heading, short = COMMANDS[name][:2]
@@ -157,11 +157,6 @@ def driftwalk(
         typer.echo(ctx.get_help())
 
 
-@cache
-def _commands() -> Any:
-    return to_click_command(app)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
@@ -181,8 +176,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     driftwalk 0.1.0
     0
     """
+    command = to_click_command(app)
     try:
-        code = _commands().main(
+        code = command.main(
             args=list(sys.argv[1:] if arguments is None else arguments),
             prog_name="driftwalk",
             standalone_mode=False,
