@@ -188,7 +188,9 @@ def _store_of_hdf5(path: Path, opened: ExitStack) -> Any:
 
     file = opened.enter_context(OpenHdf5(path))
     # HDF5 of other programs has dimensions without names.
-    named = opened.enter_context(h5netcdf.File(file, "r", phony_dims="access"))
+    named = opened.enter_context(
+        h5netcdf.File(file, "r", phony_dims="access", decode_vlen_strings=True)
+    )
     return H5NetCDFStore(named)
 
 
