@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
 import inspect
 import re
@@ -21,19 +20,15 @@ PACKAGE = Path(__file__).resolve().parents[2] / "src" / "driftwalk"
 SECTIONS = ("Parameters", "Attributes", "Returns", "Yields")
 # A class, or a dotted name of another package; texts and choices are not looked at.
 TYPE = re.compile(r"(?<![\w.`'(])([A-Z]\w+|[a-z]\w*(?:\.\w+)*\.[A-Z]\w+)")
+OWN = re.compile(r"^(?:class (\w+)|(\w{2,})(?:: [^=\n]+)? = )", re.MULTILINE)
 OF_OTHERS = {"None", "Path", "DataFrame"}
 
 
 @cache
 def own_names() -> set[str]:
     """Return the classes of the package, and the names that its modules assign."""
-    found: set[str] = set()
-    for path in PACKAGE.rglob("*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", 0)]
-            found |= {node.name} if isinstance(node, ast.ClassDef) else set()
-            found |= {target.id for target in targets if isinstance(target, ast.Name)}
-    return found
+    sources = (path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py"))
+    return {name for source in sources for names in OWN.findall(source) for name in names if name}
 
 
 def exists(name: str) -> bool:

@@ -258,11 +258,14 @@ def test_no_ring_of_imports() -> None:
     """Imports inside functions and for types count: a reader of one file has to read the other."""
     names = modules()
     needs: dict[str, set[str]] = {}
+    of_file: dict[Path, list[Import]] = {}
+    for found in all_imports():
+        of_file.setdefault(found.file, []).append(found)
     for name, file in names.items():
         inits = {name} if file.name == "__init__.py" else set()
         reached = set()
-        for found in all_imports():
-            if found.file == file and found.module.startswith("driftwalk"):
+        for found in of_file.get(file, []):
+            if found.module.startswith("driftwalk"):
                 submodules = {f"{found.module}.{each}" for each in found.names} & names.keys()
                 reached |= submodules or ({found.module} & names.keys())
         needs[name] = reached - inits

@@ -22,6 +22,7 @@ COSTLY = (
         "assembly_sizes",
         "kinetics",
         "outcome_posterior",
+        "yield",
         "classification with blocks hidden",
     ),
 )

@@ -72,18 +72,20 @@ OUTLINES = {
     "rectangle:5x2cm": rectangle(0.05, 0.02).corners,
     "xx:3cm": glued("xx", 0.03, 0.0).corners,
     "x./xx:3cm": glued("x./xx", 0.03, 0.0).corners,
-    "disc:4cm": 0.02 * np.exp(2j * np.pi * np.arange(48) / 48),
+    "disc:4cm": np.zeros(1),
 }
+RIM = {"disc:4cm": 0.02}
+"""How far the outline is beyond these points [m]."""
 
 
 def beyond(shape: str, place: np.ndarray, angle: np.ndarray, tank: dict[str, Any]) -> float:
-    """Return how far any corner was outside [m]."""
+    """Return how far any point of the outline was outside [m]."""
     corners = place[..., None] + OUTLINES[shape] * np.exp(1j * angle[..., None])
     if "diameter_m" in tank:
-        return float(np.abs(corners).max() - tank["diameter_m"] / 2)
+        return float(np.abs(corners).max() - tank["diameter_m"] / 2) + RIM.get(shape, 0.0)
     outline = [complex(*corner) for corner in tank["vertices_m"]]
     edges = zip(outline, outline[1:] + outline[:1], strict=True)
-    return max(
+    return RIM.get(shape, 0.0) + max(
         float((np.conj((b - a) / abs(b - a)) * (corners - a)).imag.min() * -1.0) for a, b in edges
     )
 

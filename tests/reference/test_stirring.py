@@ -83,7 +83,7 @@ def test_a_length_far_below_the_distance_gives_the_bits_of_none() -> None:
     np.testing.assert_array_equal(shared, alone)
 
 
-@pytest.mark.parametrize("count", [2, 12])
+@pytest.mark.parametrize("count", [2, pytest.param(12, marks=pytest.mark.slow)])
 def test_free_blocks_keep_their_distances_where_the_length_is_huge(count: int) -> None:
     places = ring(count, 0.06)
     found = forces(places, stirring_length=100.0)

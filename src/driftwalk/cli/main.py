@@ -12,6 +12,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Annotated, Any, Final, NamedTuple
 
 import typer
@@ -108,6 +109,7 @@ def _stand_in() -> None:
     """Represent a command in the list of commands."""
 
 
+@lru_cache(maxsize=64)
 def _one_command_app(name: str, function: Callable[..., Any]) -> Any:
     app = typer.Typer(add_completion=False)
     heading, short = COMMANDS[name][:2]

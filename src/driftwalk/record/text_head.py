@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError, naming_its_file
@@ -23,10 +24,16 @@ def first_lines(head: bytes, count: int = 5) -> list[str]:
 
     Nothing is returned when the bytes cannot be text.
     """
-    if _CONTROL.search(head):
+    if not _is_text(head):
         return []
-    lines = head.split(b"\n")
+    lines = head.split(b"\n", count)
     return [line.decode("utf-8", "replace").rstrip("\r") for line in lines[:count] if line.strip()]
+
+
+@lru_cache(maxsize=1)
+def _is_text(head: bytes) -> bool:
+    # One loader after the other asks of the same head.
+    return _CONTROL.search(head) is None
 
 
 def first_line(head: bytes) -> str:

@@ -42,6 +42,7 @@ def test_a_dimer_tells_hidden_drag_and_shared_stirring(tmp_path: Path) -> None:
     assert "squares, discs and rectangles assemble, and the body is 'xx'" in refused.err
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_shares_of_hidden_drag_and_lengths_are_axes(tmp_path: Path) -> None:
     """Words and numbers of the drag on joined faces, in one map with the stirring length (m)."""
     vary = ("--vary", "hidden-face-drag=none,0.5,1", "--vary", "stirring-length=0,6cm")

@@ -6,6 +6,7 @@ What a kill leaves is what lies in the folder at that moment, so the page is ope
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -113,14 +114,22 @@ class Stopped(Exception):
     """Stands for a kill."""
 
 
-@pytest.fixture
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a folder with the studies, in which the runs are made."""
+@pytest.fixture(scope="module")
+def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the files that the commands take."""
+    folder = tmp_path_factory.mktemp("given")
     for name, text in (("grid", GRID), ("known", KNOWN), ("truth", TRUTH)):
-        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
-    chain_runs(60, 1).to_netcdf(tmp_path / "runs.nc")
-    (tmp_path / "counts.csv").write_text("class,count\n2,12\n1+1,8\n", encoding="utf-8")
-    every_kind("control_policy").to_netcdf(tmp_path / "policy.nc")
+        (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+    chain_runs(60, 1).to_netcdf(folder / "runs.nc")
+    (folder / "counts.csv").write_text("class,count\n2,12\n1+1,8\n", encoding="utf-8")
+    every_kind("control_policy").to_netcdf(folder / "policy.nc")
+    return folder
+
+
+@pytest.fixture
+def place(given: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder with these files, in which the runs are made."""
+    shutil.copytree(given, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -158,25 +158,40 @@ def _opened(path: Path) -> Iterator[xr.Dataset]:
     import xarray as xr
 
     is_hdf5 = file_start(path).startswith(HDF5)
-    options: dict[str, Any] = {"engine": "h5netcdf" if is_hdf5 else "scipy"}
-    if is_hdf5:
-        # HDF5 of other programs has dimensions without names.
-        options["phony_dims"] = "access"
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), ExitStack() as opened:
             # What the libraries remark about a file of the user's is no line of ours.
             warnings.simplefilter("ignore")
             if is_hdf5:
                 refuse_endless_texts(path)
             refuse_huge(_declared_hdf5(path) if is_hdf5 else _declared_classic(path), path)
-            with xr.open_dataset(path, decode_times=False, **options) as dataset:
-                yield dataset
+            source: Any = _store_of_hdf5(path, opened) if is_hdf5 else path
+            engine: Any = None if is_hdf5 else "scipy"
+            dataset = opened.enter_context(
+                xr.open_dataset(source, decode_times=False, engine=engine)
+            )
+            dataset.encoding["source"] = str(path.absolute())
+            yield dataset
     except FormatError:
         raise
     except Exception as error:
         # On a damaged file the libraries fail with whatever the damage leads them to.
         reason = str(error) or type(error).__name__
         raise FormatError(f"cannot be read as NetCDF: {reason}", path=path) from error
+
+
+def _store_of_hdf5(path: Path, opened: ExitStack) -> Any:
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    from driftwalk.schema.stores.open_hdf5 import OpenHdf5
+
+    file = opened.enter_context(OpenHdf5(path))
+    # HDF5 of other programs has dimensions without names.
+    named = opened.enter_context(
+        h5netcdf.File(file, "r", phony_dims="access", decode_vlen_strings=True)
+    )
+    return H5NetCDFStore(named)
 
 
 def refuse_huge(declared: int, path: Path) -> None:

@@ -1,0 +1,23 @@
+"""An HDF5 file whose objects are looked up once: h5netcdf asks for each some thirty times."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import h5py
+
+
+class OpenHdf5(h5py.File):  # type: ignore[misc]
+    """A file that is read, and keeps the objects that it was asked for until it is closed."""
+
+    def __init__(self, path: Any) -> None:
+        super().__init__(path, "r")
+        self._kept: dict[str, Any] = {}
+
+    def __getitem__(self, name: Any) -> Any:
+        """Return the object of a name, or of a reference, which is no name."""
+        if not isinstance(name, str):
+            return super().__getitem__(name)
+        if name not in self._kept:
+            self._kept[name] = super().__getitem__(name)
+        return self._kept[name]
