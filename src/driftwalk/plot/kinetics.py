@@ -243,7 +243,7 @@ def plot_predicted_shares(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     for at in shown:
         one, color = kinetics.isel({"class": at}), colors[names[at]]
         ax.fill_between(time, one["share_low"], one["share_high"], color=color, alpha=0.25, lw=0)
-        ax.plot(time, one["share"], color=color)
+        ax.plot(time, one["share"], color=color, label=names[at])
         for source, marker in zip(range(kinetics.sizes["source"]), "ox", strict=False):
             seen = one["empirical"].values[source]
             ax.plot(time[::6], seen[::6], marker, color=color, ms=2.5, mew=0.7)
