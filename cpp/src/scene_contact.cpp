@@ -156,11 +156,6 @@ void second_pass(const AssemblyRules& rules, Bodies& bodies, const Manifold& m) 
   }
 }
 
-bool may_touch(const AssemblyRules& rules, const Scene& scene, BlockPair pair) {
-  return scene.block[pair.first].assembly != scene.block[pair.second].assembly &&
-         !are_far(rules, scene, pair.first, pair.second);
-}
-
 // Rounds in which blocks that overlap are shifted; beyond, they are turned too.
 constexpr int shift_rounds = 10;
 
@@ -227,15 +222,12 @@ bool keep_inside(const AssemblyRules& rules, Scene& scene, int assembly) {
 void bounce(const AssemblyRules& rules, Scene& scene) {
   for (int k = 0; k < scene.close.count; ++k) {
     const BlockPair pair = scene.close.pair[k];
-    if (!may_touch(rules, scene, pair)) {
-      continue;
-    }
-    const Overlap overlap = overlap_of(rules, scene, pair.first, pair.second);
-    if (!(overlap.depth > 0)) {
+    if (!overlap_by_more(rules, scene, pair.first, pair.second, 0)) {
       continue;
     }
     scene.contact = true;
-    const Manifold manifold = manifold_of(rules, scene, pair, overlap);
+    const Manifold manifold =
+        manifold_of(rules, scene, pair, overlap_of(rules, scene, pair.first, pair.second));
     SceneAssembly &a = assembly_of(scene, pair.first), &b = assembly_of(scene, pair.second);
     Bodies bodies{a, b, rules.mass * a.blocks, rules.mass * b.blocks};
     if (manifold.count > 0) {
@@ -275,8 +267,7 @@ void undo_jam(const AssemblyRules& rules, Scene& scene) {
     }
     for (int k = 0; k < scene.pairs.count; ++k) {
       const BlockPair pair = scene.pairs.pair[k];
-      if (may_touch(rules, scene, pair) &&
-          overlap_of(rules, scene, pair.first, pair.second).depth > tolerance) {
+      if (overlap_by_more(rules, scene, pair.first, pair.second, tolerance)) {
         jammed = true;
         take_back(scene, scene.block[pair.first].assembly);
         take_back(scene, scene.block[pair.second].assembly);
@@ -296,8 +287,7 @@ void separate(const AssemblyRules& rules, Scene& scene) {
   bool moved = false, inside = true;
   for (int k = 0; k < scene.close.count && !moved; ++k) {
     const BlockPair pair = scene.close.pair[k];
-    moved = may_touch(rules, scene, pair) &&
-            overlap_of(rules, scene, pair.first, pair.second).depth > tolerance;
+    moved = overlap_by_more(rules, scene, pair.first, pair.second, tolerance);
   }
   for (int round = 1; moved && round <= most_rounds; ++round) {
     moved = false;
@@ -307,13 +297,10 @@ void separate(const AssemblyRules& rules, Scene& scene) {
                 second = scene.block[pair.second].assembly;
       // What has not moved since the last round is as it was then.
       if (std::max(scene.assembly[first].moved, scene.assembly[second].moved) < round - 1 ||
-          !may_touch(rules, scene, pair)) {
+          !overlap_by_more(rules, scene, pair.first, pair.second, tolerance)) {
         continue;
       }
       const Overlap overlap = overlap_of(rules, scene, pair.first, pair.second);
-      if (!(overlap.depth > tolerance)) {
-        continue;
-      }
       moved = true;
       if (round <= shift_rounds) {
         shift_apart(scene, pair, overlap, round);

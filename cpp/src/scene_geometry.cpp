@@ -6,38 +6,6 @@
 
 namespace driftwalk {
 
-namespace {
-// Half the extent of a square along an axis of another one, turned by the angle between them.
-double half_extent(double half_side, Vec2 axis_first, Vec2 axis_second) {
-  return half_side *
-         (std::abs(dot(axis_first, axis_second)) + std::abs(cross(axis_first, axis_second)));
-}
-
-// How far two blocks reach towards each other along the axes of either one's side (`reach[0]`) and
-// across it (`reach[1]`).
-void reach_of(const AssemblyRules& rules, Vec2 axis_first, Vec2 axis_second, double (&reach)[2]) {
-  const double length = rules.side / 2, width = rules.width / 2;
-  if (on_lattice(rules)) {
-    reach[0] = reach[1] = length + half_extent(length, axis_first, axis_second);
-    return;
-  }
-  const double same = std::abs(dot(axis_first, axis_second));
-  const double turned = std::abs(cross(axis_first, axis_second));
-  reach[0] = length + length * same + width * turned;
-  reach[1] = width + length * turned + width * same;
-}
-} // namespace
-
-double overlap_depth(const AssemblyRules& rules, Vec2 between, Vec2 axis_first, Vec2 axis_second) {
-  double reach[2];
-  reach_of(rules, axis_first, axis_second, reach);
-  const double along =
-      std::max(std::abs(dot(between, axis_first)), std::abs(dot(between, axis_second)));
-  const double across =
-      std::max(std::abs(cross(axis_first, between)), std::abs(cross(axis_second, between)));
-  return std::min(reach[0] - along, reach[1] - across);
-}
-
 Overlap overlap_of(const AssemblyRules& rules, const Scene& scene, int first, int second) {
   const Vec2 between = centre(scene, second) - centre(scene, first);
   if (rules.round) {
@@ -47,7 +15,7 @@ Overlap overlap_of(const AssemblyRules& rules, const Scene& scene, int first, in
   const Vec2 a = axis_of(rules, scene, first), b = axis_of(rules, scene, second);
   const Vec2 axes[4] = {a, {-a.y, a.x}, b, {-b.y, b.x}};
   double reach[2];
-  reach_of(rules, a, b, reach);
+  find_reach(rules, a, b, reach);
   Overlap least{HUGE_VAL, {0, 0}, true};
   for (int k = 0; k < 4; ++k) {
     const double along = dot(between, axes[k]);

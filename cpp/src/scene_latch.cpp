@@ -132,8 +132,7 @@ Vec2 place_before(const Scene& scene, int block) {
 // a jam takes it back there.
 bool overlaps(const AssemblyRules& rules, const Scene& scene, int block, int other, Vec2 was) {
   constexpr double tolerance = 1e-4;
-  if (!are_far(rules, scene, block, other) &&
-      overlap_of(rules, scene, block, other).depth > tolerance) {
+  if (overlap_by_more(rules, scene, block, other, tolerance)) {
     return true;
   }
   const Vec2 between = was - centre(scene, block);
@@ -143,14 +142,15 @@ bool overlaps(const AssemblyRules& rules, const Scene& scene, int block, int oth
                        {before.cosine, before.sine}) > tolerance;
 }
 
-// The members of an assembly by the cells of its lattice, for whatever comes near them.
+// Members of an assembly by the cells of its lattice, for whatever comes near them: as
+// `blocks_before` links them, from one on.
 class MembersByCell {
 public:
-  MembersByCell(const AssemblyRules& rules, Scene& scene, const SceneAssembly& a)
-      : cells_(scene), origin_(scene.block[a.first]), per_side_(1.0 / rules.side),
-        axis_(face_normal(a, 0)), low_x_(origin_.cell_x), high_x_(low_x_), low_y_(origin_.cell_y),
-        high_y_(low_y_) {
-    for (int b = a.first; b >= 0; b = scene.block[b].next) {
+  MembersByCell(const AssemblyRules& rules, Scene& scene, int first)
+      : cells_(scene), origin_(scene.block[first]), per_side_(1.0 / rules.side),
+        axis_(face_normal(assembly_of(scene, first), 0)), low_x_(origin_.cell_x), high_x_(low_x_),
+        low_y_(origin_.cell_y), high_y_(low_y_) {
+    for (int b = first; b >= 0; b = scene.blocks_before[b].next) {
       const SceneBlock& block = scene.block[b];
       low_x_ = std::min(low_x_, block.cell_x);
       high_x_ = std::max(high_x_, block.cell_x);
@@ -162,7 +162,7 @@ public:
         cells_.clear(x, y);
       }
     }
-    for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    for (int b = first; b >= 0; b = scene.blocks_before[b].next) {
       cells_.add(b);
     }
   }
@@ -196,26 +196,25 @@ private:
   int low_x_, high_x_, low_y_, high_y_;
 };
 
-// Only what may be near is looked at: assemblies within a circle, of these blocks, of these the
-// members of this one that they may touch as they are or were.
-bool is_clear_of_others(const AssemblyRules& rules, Scene& scene, int assembly) {
-  const SceneAssembly& a = scene.assembly[assembly];
-  double farthest = 0;
-  for (int b = a.first; b >= 0; b = scene.block[b].next) {
-    const SceneBlock& block = scene.block[b];
-    farthest =
-        std::max(farthest, block.offset_x * block.offset_x + block.offset_y * block.offset_y);
-  }
-  const MembersByCell members(rules, scene, a);
-  const double touching = 1.42 * rules.side; // a diagonal and a little more
-  const double reach = std::sqrt(farthest) + touching;
+// Whether members of an assembly, as `blocks_before` links them from one on, are clear of all
+// others. Only what may be near is looked at: assemblies within a circle, of these blocks, of these
+// the members that they may touch as they are or were.
+bool are_clear_of_others(const AssemblyRules& rules, Scene& scene, int first) {
+  const Vec2 middle = centre(scene, first);
   const auto square_from_middle = [&](Vec2 place) {
-    const Vec2 from_middle = place - Vec2{a.x, a.y};
+    const Vec2 from_middle = place - middle;
     return dot(from_middle, from_middle);
   };
+  double farthest = 0;
+  for (int b = first; b >= 0; b = scene.blocks_before[b].next) {
+    farthest = std::max(farthest, square_from_middle(centre(scene, b)));
+  }
+  const MembersByCell members(rules, scene, first);
+  const double touching = 1.42 * rules.side; // a diagonal and a little more
+  const double reach = std::sqrt(farthest) + touching;
   for (int other = 0; other < scene.blocks; ++other) {
     const SceneAssembly& others = scene.assembly[other];
-    if (others.blocks == 0 || other == assembly) {
+    if (others.blocks == 0 || other == scene.block[first].assembly) {
       continue;
     }
     // The square of a member's distance times a block's mass is a part of the moment of inertia,
@@ -347,7 +346,9 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
   conserve_momentum(kept, moved, rules.mass, body);
   place_by(scene, joint, merge.anchor, anchor);
   if (!push_inside(rules, scene, joint, most_rounds) ||
-      (on_lattice(rules) && !is_clear_of_others(rules, scene, joint)) ||
+      // Those that have moved first: they are more often in the way, and fewer.
+      (on_lattice(rules) && !(are_clear_of_others(rules, scene, moved.first) &&
+                              are_clear_of_others(rules, scene, kept.first))) ||
       (rules.faces != nullptr && poles_refuse(*rules.faces, scene, kept.first, moved.first))) {
     copy_members(kept, scene.blocks_before, scene.block);
     copy_members(moved, scene.blocks_before, scene.block);
@@ -377,8 +378,7 @@ bool may_latch(const AssemblyRules& rules, const Scene& scene, BlockPair pair) {
     return false;
   }
   if (rules.latching == Latching::collision) {
-    return !are_far(rules, scene, pair.first, pair.second) &&
-           overlap_of(rules, scene, pair.first, pair.second).depth > 0;
+    return overlap_by_more(rules, scene, pair.first, pair.second, 0);
   }
   const Vec2 between = centre(scene, pair.second) - centre(scene, pair.first);
   const double reach = rules.side + rules.connector_distance;

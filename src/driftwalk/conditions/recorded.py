@@ -304,7 +304,8 @@ def recorded_start(track: Track, *, window: float = 0.7) -> Start:
     turn = np.unwrap(np.where(np.isfinite(track.theta[first]), track.theta[first], 0.0))
     values = np.column_stack([track.x[first], track.y[first], turn])
     # The first sample has neighbours on one side only: half of this window holds none.
-    position, velocity, _ = (fit[0] for fit in local_quadratic(time, values, window=2.0 * window))
+    fits = local_quadratic(time, values, window=2.0 * window, at=slice(1))
+    position, velocity, _ = (fit[0] for fit in fits)
     raw = values[0]
     position = np.where(np.isfinite(position), position, raw)
     velocity = np.where(np.isfinite(velocity), velocity, 0.0)

@@ -161,7 +161,8 @@ def study_for(
     Returns
     -------
     Study
-        With the recordings' tank and block.
+        With the recordings' tank and block; with the force interval of a simulated one where the
+        study states none.
 
     Raises
     ------
@@ -196,6 +197,9 @@ def study_for(
             chosen = own
         fitted = fitted or is_fitted(recording)
         chosen = study_of_block(chosen, recording, stated=block)
+        every = recording.attrs.get("force_interval_s")
+        if every is not None and not is_stated(chosen, "forces.force_interval_s"):
+            chosen = apply_overrides(chosen, {"forces.force_interval_s": float(every)})
         tank = tank or "arena" in recording.attrs
         block |= {key for key, (name, *_) in _BLOCK_ATTRIBUTES.items() if name in recording.attrs}
     for recording in recordings if tank or needs_tank else ():

@@ -27,7 +27,12 @@ _CHUNK = 1 << 15
 
 
 def local_quadratic(
-    time: npt.ArrayLike, values: npt.ArrayLike, *, window: float, gap_factor: float = 1.5
+    time: npt.ArrayLike,
+    values: npt.ArrayLike,
+    *,
+    window: float,
+    gap_factor: float = 1.5,
+    at: slice = slice(None),
 ) -> tuple[Floats, Floats, Floats]:
     """Fit a parabola by least squares around every sample, and return it at the sample.
 
@@ -46,6 +51,8 @@ def local_quadratic(
         Full width of the window [s].
     gap_factor : float, optional
         Multiple of the median interval above which an interval is a gap, at least 1.
+    at : slice, optional
+        Samples at which the parabola is wanted; at the others the result is NaN.
 
     Returns
     -------
@@ -76,7 +83,11 @@ def local_quadratic(
     present = np.isfinite(columns).all(axis=1)
     fit = np.full((3, *columns.shape), np.nan)
     if np.count_nonzero(present) >= MIN_SAMPLES:
-        fit[:, present] = _fit_present(times[present], columns[present], window, gap_factor)
+        wanted = np.zeros(times.size, dtype=bool)
+        wanted[at] = True
+        fit[:, present] = _fit_present(
+            times[present], columns[present], window, gap_factor, wanted[present]
+        )
     value, velocity, acceleration = fit.reshape(3, *np.shape(values))
     return value, velocity, acceleration
 
@@ -98,14 +109,16 @@ def _checked(
     return times, samples if samples.ndim == 2 else samples[:, None]
 
 
-def _fit_present(time: Floats, values: Floats, window: float, gap_factor: float) -> Floats:
+def _fit_present(
+    time: Floats, values: Floats, window: float, gap_factor: float, wanted: Bools
+) -> Floats:
     """Return value, velocity, acceleration, shape (3, n, k), of samples that are all present."""
     intervals = np.diff(time)
     interval = float(np.median(intervals))
     first, last = _windows(time, intervals, 0.5 * window + _EDGE * interval, gap_factor * interval)
     half = int((0.5 * window + _EDGE * interval) / interval)
     fit = np.full((3, *values.shape), np.nan)
-    enough = last - first + 1 >= MIN_SAMPLES
+    enough = wanted & (last - first + 1 >= MIN_SAMPLES)
     even = enough & _even_windows(intervals, interval, first, last, half)
     if even.any():
         fit[:, even] = _convolve(values, half, interval)[:, even]

@@ -48,6 +48,7 @@ from driftwalk.likelihood.tracker_errors.dropped import (
     places_of,
     with_gaps,
 )
+from driftwalk.likelihood.tracker_errors.noise_free import AddedNoise, with_least_noise
 from driftwalk.likelihood.tracker_errors.smoothed import require_raw
 from driftwalk.record import without_outliers
 from driftwalk.schema import Track, body_track
@@ -94,6 +95,8 @@ class PreparedRecordings:
     """Frames of each recording that are missing though the stamps say a constant rate."""
     mistakes: int
     """Samples that are left out as mistakes of the tracker."""
+    added: AddedNoise
+    """The most that a recording without noise of a camera got."""
     measured: MeasuredFlow | None = None
     earlier: Earlier | None = None
     """Posterior of a fit of one block in the same water, for glued blocks."""
@@ -166,6 +169,7 @@ class PreparedRecordings:
             "mistakes": self.mistakes,
             # Left out when the recordings were read: too far away for `max_speed`.
             "jumps_removed": sum(_jumps_removed(one, self.body) for one in many),
+            **{f"added_{name}": value for name, value in self.added._asdict().items() if value},
             "dropped_frames": sum(one.frames for one in self.dropped),
             "dropped_places": "; ".join(
                 prefix_of(recording) + places_of(one)
@@ -199,7 +203,7 @@ def prepare(
     require_size(len(intervals.labels), 2 * spline_of(study).size)
     tracks, parts, places = [], [], []
     raws: list[Track] = []
-    mistakes, dropped = 0, list[DroppedFrames]()
+    mistakes, dropped, added = 0, list[DroppedFrames](), AddedNoise(0.0, 0.0)
     for index, recording in enumerate(many):
         seen, where = body_track(recording, body), prefix_of(recording)
         track = without_outliers(seen)
@@ -209,6 +213,8 @@ def prepare(
         # Smoothing is looked for in the track as recorded: gaps would cut its spectrum.
         raws.append(track)
         dropped.append(find_dropped_frames(track, recording["time"].values))
+        track, more = with_least_noise(track, side=study.block.side_m, number=index)
+        added = AddedNoise(*map(max, added, more))
         track = with_gaps(track, dropped[-1])
         cut = cut_track(track, intervals, fewest=LIMIT.fewest_samples, where=where)
         for number, part in enumerate(cut):
@@ -243,7 +249,7 @@ def prepare(
             require_raw(raw, where=prefix_of(recording))
     return PreparedRecordings(
         many, study, body, tracks, parts, places, intervals, series, used_angle, dropped, mistakes,
-        measured,
+        added, measured,
     )  # fmt: skip
 
 

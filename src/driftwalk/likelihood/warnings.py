@@ -134,6 +134,18 @@ def _on_the_lever(facts: Mapping[str, Any], most_m: float) -> Iterator[str]:
         )
 
 
+def _on_added_noise(facts: Mapping[str, Any]) -> Iterator[str]:
+    position = facts.get("added_position_noise_m", 0.0)
+    turning = facts.get("added_orientation_noise_rad", 0.0) if facts["angle"] == "state" else 0.0
+    if position:
+        also = f" and {math.degrees(turning):.2g}°" if turning else ""
+        yield (
+            f"the recording has hardly any noise of a camera: {1e3 * position:.2g} mm{also} were "
+            "added, as the filter's approximations of the motion are no more exact; the noise of "
+            "the answer contains them"
+        )
+
+
 def _on_the_data(
     facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals
 ) -> Iterator[str]:
@@ -150,6 +162,7 @@ def _on_the_data(
             f"rate, {facts['dropped_places']}: the steps across them are two or more times as long "
             "as their neighbours; their time was put in. Record the time of every frame"
         )
+    yield from _on_added_noise(facts)
     used, usable = facts["samples_used"], facts["intervals_usable"]
     if used < WARNING.least_used * usable:
         yield (

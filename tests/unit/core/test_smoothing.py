@@ -63,7 +63,13 @@ def test_matches_polyfit_on_an_uneven_clock_with_gaps() -> None:
     values = synthetic_walk(300, 4)
     expected = fit_each_window(time, values, 0.7)
     assert np.isnan(expected[0]).any()
-    assert_same_fit(local_quadratic(time, values, window=0.7), expected, 1e-10)
+    found = local_quadratic(time, values, window=0.7)
+    assert_same_fit(found, expected, 1e-10)
+    for whole, some in zip(
+        found, local_quadratic(time, values, window=0.7, at=slice(2)), strict=True
+    ):
+        np.testing.assert_array_equal(some[:2], whole[:2])
+        assert np.isnan(some[2:]).all()
 
 
 def test_no_window_reaches_across_a_gap() -> None:

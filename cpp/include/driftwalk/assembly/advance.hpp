@@ -182,24 +182,32 @@ inline bool has_faces_to_skip(const Physics<Real, T, Law>& physics, const Member
   return 10 * count > 3 * 4 * rows * Numbers<Real>::lanes;
 }
 
+// Drag of blocks whose open faces are taken side by side; not inlined, for the sake of those
+// that have none to skip.
+template <class Real, class T, class Law>
+[[gnu::noinline]] void feel_drag_of_open_faces(const Physics<Real, T, Law>& physics,
+                                               Member<Real>* members, Sums<Real>* sums, int rows) {
+  AheadMember<Real> ahead[most_open_blocks];
+  OpenFaces<Real> faces;
+  for (int row = 0; row < rows; ++row) {
+    ahead[row] = ahead_of(physics, members[row]);
+    faces.add(physics.block, physics.flow, ahead[row].x, ahead[row].y, ahead[row].axes,
+              ahead[row].own, members[row].covered);
+  }
+  faces.sum(physics.law, physics.block, physics.flow);
+  for (int row = 0; row < rows; ++row) {
+    const DragSums<Real> drag =
+        faces.take(physics.block, physics.flow.unit, ahead[row].axes, ahead[row].own);
+    add_drag(physics, ahead[row], drag, members[row].turn, sums[row]);
+  }
+}
+
 template <class Real, class T, class Law>
 inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>* members, Sums<Real>* sums,
                       int rows) {
   if constexpr (Numbers<Real>::lanes > 1) {
     if (has_faces_to_skip(physics, members, rows)) {
-      AheadMember<Real> ahead[most_open_blocks];
-      OpenFaces<Real> faces;
-      for (int row = 0; row < rows; ++row) {
-        ahead[row] = ahead_of(physics, members[row]);
-        faces.add(physics.block, physics.flow, ahead[row].x, ahead[row].y, ahead[row].axes,
-                  ahead[row].own, members[row].covered);
-      }
-      faces.sum(physics.law, physics.block, physics.flow);
-      for (int row = 0; row < rows; ++row) {
-        const DragSums<Real> drag =
-            faces.take(physics.block, physics.flow.unit, ahead[row].axes, ahead[row].own);
-        add_drag(physics, ahead[row], drag, members[row].turn, sums[row]);
-      }
+      feel_drag_of_open_faces(physics, members, sums, rows);
       return;
     }
   }

@@ -315,6 +315,13 @@ inline void meet_walls(const Physics<Real, T, Law>& physics, Member<Real>* membe
   });
 }
 
+// The axes of a block in a lane: of a rectangle its own.
+template <class Real, class T>
+inline Axes<T> near_axes(const NearRules<T>& rules, const Member<Real>& m, int lane) {
+  const Axes<T> axes = one_lane(m.axes, lane);
+  return rules.half_width > T(0) ? turned_axes(axes, one_lane(m.turn, lane)) : axes;
+}
+
 // Whether a pair of the list overlaps or may latch.
 template <class Real, class T>
 inline bool is_to_settle(const NearRules<T>& rules, const Member<Real>* members,
@@ -328,8 +335,8 @@ inline bool is_to_settle(const NearRules<T>& rules, const Member<Real>* members,
     if (!(dx * dx + dy * dy < rules.reach * rules.reach)) {
       continue;
     }
-    const Axes<T> a = one_lane(near_axes(rules, members[first / lanes]), first % lanes);
-    const Axes<T> b = one_lane(near_axes(rules, members[second / lanes]), second % lanes);
+    const Axes<T> a = near_axes(rules, members[first / lanes], first % lanes);
+    const Axes<T> b = near_axes(rules, members[second / lanes], second % lanes);
     if (may_meet<T, T>(rules, dx, dy, a, b)) {
       return true;
     }

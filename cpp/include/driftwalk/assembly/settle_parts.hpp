@@ -4,6 +4,9 @@
 
 #include "driftwalk/assembly/scene.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace driftwalk {
 
 struct Vec2 {
@@ -67,22 +70,56 @@ inline Vec2 axis_of(const AssemblyRules& rules, const Scene& scene, int block) {
                          : Vec2{a.cosine, a.sine};
 }
 
-// Whether two blocks are so far apart that they cannot touch.
-inline bool are_far(const AssemblyRules& rules, const Scene& scene, int first, int second) {
-  const Vec2 between = centre(scene, second) - centre(scene, first);
-  return !(dot(between, between) < square_of_diagonal(rules));
+// How far two blocks reach towards each other along the axes of either one's side (`reach[0]`) and
+// across it (`reach[1]`).
+inline void find_reach(const AssemblyRules& rules, Vec2 axis_first, Vec2 axis_second,
+                       double (&reach)[2]) {
+  const double length = rules.side / 2, width = rules.width / 2;
+  const double same = std::abs(dot(axis_first, axis_second));
+  const double turned = std::abs(cross(axis_first, axis_second));
+  if (on_lattice(rules)) {
+    reach[0] = reach[1] = length + length * (same + turned);
+    return;
+  }
+  reach[0] = length + length * same + width * turned;
+  reach[1] = width + length * turned + width * same;
 }
 
-// Overlap of two blocks: its depth (negative when clear) and the axis of least penetration, which
-// points from the first to the second. `reference` is the block whose face the axis is normal to.
+// Depth of the overlap of two blocks at given places with given axes, negative when clear.
+inline double overlap_depth(const AssemblyRules& rules, Vec2 between, Vec2 axis_first,
+                            Vec2 axis_second) {
+  double reach[2];
+  find_reach(rules, axis_first, axis_second, reach);
+  const double along =
+      std::max(std::abs(dot(between, axis_first)), std::abs(dot(between, axis_second)));
+  const double across =
+      std::max(std::abs(cross(axis_first, between)), std::abs(cross(axis_second, between)));
+  return std::min(reach[0] - along, reach[1] - across);
+}
+
+// Whether two blocks of different assemblies overlap by more than so much.
+inline bool overlap_by_more(const AssemblyRules& rules, const Scene& scene, int first, int second,
+                            double than) {
+  if (scene.block[first].assembly == scene.block[second].assembly) {
+    return false;
+  }
+  const Vec2 between = centre(scene, second) - centre(scene, first);
+  if (!(dot(between, between) < square_of_diagonal(rules))) {
+    return false;
+  }
+  return (rules.round ? rules.side - std::sqrt(dot(between, between))
+                      : overlap_depth(rules, between, axis_of(rules, scene, first),
+                                      axis_of(rules, scene, second))) > than;
+}
+
+// The overlap of two blocks, and the axis of least penetration, which points from the first to the
+// second. `reference` is the block whose face the axis is normal to.
 struct Overlap {
   double depth;
   Vec2 normal;
   bool reference_is_first;
 };
 Overlap overlap_of(const AssemblyRules& rules, const Scene& scene, int first, int second);
-// The depth alone, of blocks at given places with given axes.
-double overlap_depth(const AssemblyRules& rules, Vec2 between, Vec2 axis_first, Vec2 axis_second);
 
 // Links a block to the members of its assembly.
 inline void add_member(Scene& scene, SceneAssembly& assembly, int block) {

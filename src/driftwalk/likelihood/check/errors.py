@@ -16,7 +16,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats, Integers
-from driftwalk.likelihood.filter.filter_pass import Place, Sums
+from driftwalk.likelihood.filter.difference_pairs import used_of
+from driftwalk.likelihood.filter.filter_pass import Place, Sums, whitened
 from driftwalk.likelihood.filter.series import Series, layer_strengths
 from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.spline import DEGREE, Spline, basis
@@ -52,10 +53,10 @@ class Innovations:
 def innovations_of(estimate: Estimate) -> list[Innovations]:
     """Run the filter over every series at the estimate."""
     found = []
-    whitened = estimate.passes.innovations(estimate.point)
-    for series, (white, used) in zip(estimate.passes.series, whitened, strict=True):
+    for series in estimate.passes.series:
         point = estimate.point.in_flow(series.flow)
-        states = estimate.passes.states(series, point)
+        passed = estimate.passes.run(series, point)
+        states, white, used = passed["state"], whitened(passed), used_of(passed)
         speed = np.full(series.time.size, np.nan)
         # The state before the sample: to sort errors by what they caused would bias them.
         before = states[:-1]

@@ -135,28 +135,16 @@ def _require_replicates(found: Replicates) -> None:
         )
 
 
-AT_ONCE: Final = 4
-"""Recordings that are laid out for comparison at a time: of a fast camera each takes 3 MB."""
-
-
 def _distances(first: Sequence[Floats], second: Sequence[Floats], threads: int) -> Floats:
     """Return the KS distances of every recording to every other, (first, second)."""
-    own = _padded(first)
-    others = (second[k : k + AT_ONCE] for k in range(0, len(second), AT_ONCE))
-    found = [StepDistance().matrix(own, _padded(one), threads=threads) for one in others]
-    return np.concatenate(found, axis=1)
+    return StepDistance().matrix(_padded(first), _padded(second), threads=threads)
 
 
 def _distances_among(steps: Sequence[Floats], threads: int) -> Floats:
     """Return the KS distance of every recording to every other, (recordings, recordings)."""
     found = np.zeros((len(steps), len(steps)))
-    for k in range(0, len(steps), AT_ONCE):
-        own, later = steps[k : k + AT_ONCE], steps[k + AT_ONCE :]
-        rows, columns = np.triu_indices(len(own), 1)
-        table = _padded(own)
-        found[k + rows, k + columns] = distances_among(StepDistance(), table, threads=threads)
-        if later:
-            found[k : k + AT_ONCE, k + AT_ONCE :] = _distances(own, later, threads)
+    among = distances_among(StepDistance(), _padded(steps), threads=threads)
+    found[np.triu_indices(len(steps), 1)] = among
     return found + found.T
 
 

@@ -17,6 +17,7 @@ from driftwalk.comparison import StepPlan
 from driftwalk.conditions import recorded_start
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.likelihood.filter.series import FILTER
+from driftwalk.likelihood.preparation import Estimate
 from driftwalk.schema import Track
 from driftwalk.simulation.initial import Start
 
@@ -61,6 +62,26 @@ class Sections:
     """Place of each sample on the grid."""
 
 
+def further_apart(estimate: Estimate) -> Estimate:
+    """Return the estimate with the frames of a fast camera some 0.1 s apart.
+
+    Between its frames a block moves by less than the camera is noisy: steps would compare noise.
+    """
+    tracks, series = list(estimate.tracks), list(estimate.passes.series)
+    for k, (track, one) in enumerate(zip(tracks, series, strict=True)):
+        if one.pooled > 1:
+            kept = frames_of(track.time, one.pooled)
+            tracks[k], series[k] = Track(*(axis[kept] for axis in track)), one.at(kept)
+    return replace(estimate, tracks=tracks, passes=replace(estimate.passes, series=series))
+
+
+def frames_of(time: Floats, every: int) -> Integers:
+    """Return the samples of one frame in `every`; where that frame is missing there is none."""
+    frame = _frames(time)
+    kept = np.flatnonzero(frame % every == 0)
+    return kept[np.diff(frame[kept], prepend=-1) > 0]
+
+
 def first_samples(track: Track, every: float) -> Integers:
     """Return the samples at which replicates begin again: every `every` seconds, and after gaps."""
     time = track.time
@@ -83,8 +104,7 @@ def sections_of(track: Track, first: Integers, *, window: float) -> list[Section
     ends = np.append(first[1:], time.size)
     section = np.repeat(np.arange(first.size), ends - first)
     starts = _starts(track, first, ends, window=window)
-    intervals, regular = _intervals(time)
-    if not regular:
+    if not _intervals(time)[1]:
         return [
             Sections(
                 time[begin:end] - time[begin],
@@ -96,7 +116,7 @@ def sections_of(track: Track, first: Integers, *, window: float) -> list[Section
             )
             for k, (begin, end) in enumerate(zip(first, ends, strict=True))
         ]
-    passed = np.concatenate([[0], np.cumsum(np.rint(intervals).astype(np.int64))])
+    passed = _frames(time)
     place = passed - passed[first][section]
     grid = _interval(time) * np.arange(place.max() + 1)
     return [Sections(grid, time[first], starts, np.arange(time.size), section, place)]
@@ -106,6 +126,11 @@ def _interval(time: Floats) -> float:
     """Return the usual interval [s]: a mean, for the median of rounded stamps drifts."""
     intervals = np.diff(time)
     return float(intervals[intervals < 1.5 * np.median(intervals)].mean())
+
+
+def _frames(time: Floats) -> Integers:
+    """Return how many usual intervals have passed at each sample."""
+    return np.concatenate([[0], np.cumsum(np.rint(_intervals(time)[0]).astype(np.int64))])
 
 
 def _intervals(time: Floats) -> tuple[Floats, bool]:

@@ -33,7 +33,7 @@ from driftwalk.likelihood.check.replicates import (
     replicates_at_estimate,
     restarted,
 )
-from driftwalk.likelihood.check.restarts import RESTART
+from driftwalk.likelihood.check.restarts import RESTART, further_apart
 from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.verdict import verdict_on
 from driftwalk.likelihood.fit import fit_motion
@@ -238,29 +238,29 @@ def check_model(
     }
     parts = [white_variables(found), place_variables(found)]
     try:
-        problems = problems_of(fit, estimate, many)
-        series = restarted(problems, estimate, every=RESTART.steps_s)
-        real, threads = recorded_steps(series, estimate), problems[0].like.threads
-        # One set after the other: of a fast camera each takes a hundred megabytes.
+        seen = further_apart(estimate)
+        problems = problems_of(fit, seen, many)
+        series = restarted(problems, seen, every=RESTART.steps_s)
+        real, threads = recorded_steps(series, seen), problems[0].like.threads
         near = distances_at_estimate(
             real,
-            replicates_at_estimate(fit, estimate, series, count=replicates, seed=seed),
+            replicates_at_estimate(fit, seen, series, count=replicates, seed=seed),
             threads=threads,
         )
         drawn = posterior_replicates(
-            fit, estimate, series, found.leverage.spread, count=replicates, seed=seed
+            fit, seen, series, found.leverage.spread, count=replicates, seed=seed
         )
         motion = compare_motion(real, near, drawn, threads=threads)
         free = posterior_replicates(
             fit,
-            estimate,
-            restarted(problems, estimate, every=RESTART.change_s),
+            seen,
+            restarted(problems, seen, every=RESTART.change_s),
             found.leverage.spread,
             count=replicates,
             seed=seed,
             with_path=True,
         )
-        paths = [(one.series.time, one.series.x, one.series.y) for one in errors]
+        paths = [(one.time, one.x, one.y) for one in seen.passes.series]
         scan = scan_of(paths, free.paths, found.layout, level=VERDICT.level)
         parts.append(motion_variables(motion))
         attrs |= motion_facts(motion)

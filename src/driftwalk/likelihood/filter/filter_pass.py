@@ -206,7 +206,7 @@ class Passes:
         D is 3 with the angle in the state, else 2. The innovation of a missing angle is 0.
         """
         found = [self._errors(series, point.in_flow(series.flow)) for series in self.series]
-        return [(_whitened(one), used_of(one)) for one in found]
+        return [(whitened(one), used_of(one)) for one in found]
 
     def states(self, series: Series, point: Point) -> Floats:
         """Return coordinates and velocities after each sample, shape (n, 2 D); NaN without."""
@@ -277,7 +277,8 @@ class Passes:
         )
 
 
-def _whitened(found: dict[str, Any]) -> Floats:
+def whitened(found: dict[str, Any]) -> Floats:
+    """Return the whitened innovations of a pass, shape (n, D)."""
     white = forward(factor(found["covariance"]), found["innovation"].T).T
     # To the filter a missing angle is one measured where it was predicted, with an enormous error.
     return np.where(found["innovation"] == 0.0, 0.0, white)

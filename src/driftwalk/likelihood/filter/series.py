@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.memoize import remembered
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
 
@@ -245,6 +246,7 @@ class Angle(NamedTuple):
     """Where orientations are near enough in time to tell."""
 
 
+@remembered
 def smooth_angle(time: Floats, theta: Floats) -> Angle:
     """Fit a parabola to the orientations nearest in time to each sample, five or those in 0.16 s.
 

@@ -237,7 +237,8 @@ class DroppedFrames(NamedTuple):
     rate: float
     """Estimated share of the intervals that lack frames."""
     evidence: float
-    """Logarithm of the likelihood ratio of that rate over none."""
+    """Logarithm of the likelihood ratio of that rate over none; 0 where the rates are not those of
+    dropped frames."""
     interval: float
     """Between frames [s]; NaN where the stamps have no constant rate."""
 
@@ -280,12 +281,14 @@ def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
             return nothing
         axes = _axes(track, interval * np.concatenate([[0.0], np.cumsum(lengths)]))
         likelihood = log_likelihoods(axes, starts, lengths, stamped, dt=interval)
-        rates, value = _rates(likelihood)
+        shares = _shares(likelihood)
+        rates, value = _rates(shares)
         # The evidence comes from the first round: later ones have fitted the lengths to the track.
         if number == 0:
-            evidence = value - _rates(likelihood, without=DROPS)[1]
-            seem = _are_dropped_frames(rates, DROPPED.most_control_before)
-            if evidence < DROPPED.evidence or not seem:
+            if not _are_dropped_frames(rates, DROPPED.most_control_before):
+                return nothing
+            evidence = value - _rates(shares, without=DROPS)[1]
+            if evidence < DROPPED.evidence:
                 return nothing._replace(evidence=evidence)
         share = _posterior(likelihood, rates)
         some = share.sum(axis=1)
@@ -371,25 +374,45 @@ def _axis(time: Floats, values: Floats, noise: float, intensity: float) -> Axis:
     return Axis(values, std, max(intensity, 1e-6 * std**2 / interval**3), usual)
 
 
-def _rates(likelihood: Floats, *, without: tuple[int, ...] = ()) -> tuple[Floats, float]:
-    """Return how often everything happens in an interval, shape (CLASSES,), and how likely that is.
+class _Shares(NamedTuple):
+    """Likelihoods of the classes, relative to the most likely pattern of each window."""
 
-    A window is one of seven that see the same interval: their likelihood is that to the power of
-    seven.
-    """
+    top: Floats
+    """Logarithm of the likelihood of that pattern, (w,)."""
+    anywhere: Floats
+    """Sums over the places in the window, (w, CLASSES)."""
+    here: Floats
+    """Those at the middle interval alone, (w, CLASSES)."""
+
+
+def _shares(likelihood: Floats) -> _Shares:
+    """Return the likelihood of each class in each window."""
     top = likelihood.max(axis=1)
     scaled = likelihood - top[:, None]
     np.exp(scaled, out=scaled)
     kinds = [kind == KIND for kind in range(CLASSES)]
     anywhere = np.stack([scaled[:, one].sum(axis=1) for one in kinds], axis=1)
     here = np.stack([scaled[:, one & AT_MIDDLE].sum(axis=1) for one in kinds], axis=1)
+    return _Shares(top, anywhere, here)
+
+
+def _rates(shares: _Shares, *, without: tuple[int, ...] = ()) -> tuple[Floats, float]:
+    """Return how often everything happens in an interval, shape (CLASSES,), and how likely that is.
+
+    A window is one of seven that see the same interval: their likelihood is that to the power of
+    seven.
+    """
+    top, anywhere, here = shares
+    part = np.empty_like(here)
     rates = np.full(CLASSES, DROPPED.first_rate)
     for _ in range(60):
         rates[list(without)] = 0.0
         weight = _weights(rates)
         total = anywhere @ weight
         before = rates
-        rates = np.maximum(weight * (here / total[:, None]).mean(axis=0) / HERE, 1e-6)
+        # Into memory that is there: new one for each step takes as long as the step.
+        np.divide(here, total[:, None], out=part)
+        rates = np.maximum(weight * part.mean(axis=0) / HERE, 1e-6)
         if np.abs(rates - before)[CLEAN + 1 :].max() < 1e-6:
             break
     return before, float((top + np.log(total)).sum()) / (WIDTH - 1)

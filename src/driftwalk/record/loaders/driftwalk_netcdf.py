@@ -68,7 +68,7 @@ class DriftwalkLoader:
 
 
 def _replicate(simulation: xr.Dataset, replicate: int) -> xr.Dataset:
-    """Return one simulated world as a recording; of the attributes tank and block stay."""
+    """Return one simulated world as a recording; tank, block and force interval stay stated."""
     count = simulation.sizes["replicate"]
     if not 0 <= replicate < count:
         raise InputError(f"no `replicate` {replicate}: the simulation has {count}, counted from 0")
@@ -76,6 +76,8 @@ def _replicate(simulation: xr.Dataset, replicate: int) -> xr.Dataset:
     kept = {name: simulation.attrs[name] for name in ("arena",) if name in simulation.attrs}
     if "model" not in simulation.attrs and "study" in simulation.attrs:
         kept |= block_of_study(parse_toml(str(simulation.attrs["study"])))
+        if "force_interval_s" in simulation.attrs:
+            kept["force_interval_s"] = simulation.attrs["force_interval_s"]
     version = KINDS["trajectory"].version
     chosen.attrs = {"kind": "trajectory", "schema_version": version, "simulated": "yes", **kept}
     return chosen

@@ -52,8 +52,11 @@ class Estimate(NamedTuple):
 
     @property
     def unknown(self) -> bool:
-        """Whether an open interval means that the recording does not determine the number."""
-        return self.open and self.role == "model"
+        """Whether the recording does not determine the number: by a factor of ten either way."""
+        if self.ends is None or self.role != "model":
+            return False
+        low, high = self.ends
+        return self.open or (low > 0.0 and high > 100.0 * low)
 
     @property
     def stated(self) -> bool:

@@ -228,6 +228,10 @@ variables (the wall was estimated, from eight passages or more):
     wall_restitution_interval(bound) [1]: its interval
     wall_friction [1]: friction of the wall
     wall_friction_interval(bound) [1]: its interval; infinite where every contact may stick
+variables (a recording has hardly any noise of a camera):
+    added_position_noise [m]: white noise that was added to its positions; the largest of all \
+        recordings
+    added_orientation_noise [rad]: the same of its orientations
 variables (with switching times):
     flow text
     interval_flow(flow_interval) [1] int: number of the flow in each interval between the \

@@ -54,6 +54,8 @@ attributes (several tanks in one recording):
     bodies_apart yes or no: whether each body has a tank of its own
 attributes (simulated):
     simulated yes or no: whether a model made the motion
+attributes (simulated by driftwalk):
+    force_interval_s number: interval at which the force was redrawn
 attributes (tracked videos):
     tracked_from text: the video or camera
     complete yes or no: whether tracking reached the end

@@ -7,7 +7,13 @@ import pytest
 
 from driftwalk.comparison import StepDistance, apply_steps
 from driftwalk.core.arrays import Floats
-from driftwalk.likelihood.check.restarts import RESTART, first_samples, sections_of, within_sections
+from driftwalk.likelihood.check.restarts import (
+    RESTART,
+    first_samples,
+    frames_of,
+    sections_of,
+    within_sections,
+)
 from driftwalk.schema import Track
 
 WINDOW_S = 0.7
@@ -51,6 +57,17 @@ def test_sections_hold_each_sample_at_its_time(dropped: float, jitter: float) ->
             own, past[one.sample], atol=4.0 * jitter * (len(parts) == 1) + 1e-9
         )
         assert np.diff(one.time).max() <= 1.0  # none goes over the gap of 7 s
+
+
+@pytest.mark.parametrize("stamp", [0.0, 1e-3])
+def test_frames_of_a_fast_camera_stay_on_its_clock(stamp: float) -> None:
+    """At 60 Hz with missing frames, and with stamps that are rounded to milliseconds."""
+    there = np.random.default_rng(4).random(36_000) > 0.02
+    time = 5.0 + np.arange(36_000)[there] / 60.0
+    seen = np.round(time / stamp) * stamp if stamp else time
+    assert there[0]  # with this seed: frames count from it
+    wanted = np.flatnonzero(np.flatnonzero(there) % 6 == 0)
+    np.testing.assert_array_equal(frames_of(seen, 6), wanted)
 
 
 def test_an_irregular_recording_begins_again_less_often() -> None:
