@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 SHOWN_SHARE = 0.01
 """Classes that reach this share are drawn, and the transitions with this part of what leaves."""
 MOST_ROWS: Final = 8
-"""Classes of one column: what a page is high enough for."""
+"""Classes of one column: as many as one page is high enough for; chosen by eye."""
 CLASS_PT = 28.0
 """Diameter of the circle about the sketch of a class [pt]; chosen by eye."""
 APART_PT = 3.5
 """Half of the distance between an arrow there and the one back [pt]; chosen by eye."""
 MARGINS_PT: Final = ((30.0, 30.0), (30.0, 17.0))
-"""What a circle with its name needs around its middle, across and up [pt]; chosen by eye."""
+"""Room around the middle of a circle for itself and its name, across and up [pt]; chosen by eye."""
 WORD: Final = np.array([0.5, 1.0])
 """A word is twice as wide as high: how near two are counts by these weights, across and up."""
 GRAPH_TITLE: Final = "rates (per 1000 s); width: share of what leaves the class"
