@@ -150,7 +150,7 @@ def plot_refined_map(
         at_x, at_y = (one.values(calibration, "refined_") for one in (across, up))
         # Only levels of the colour bar: a polynomial may leave what a score can be.
         low, high = mesh.get_clim()
-        levels = MaxNLocator(7).tick_values(low, high)
+        levels = np.asarray(MaxNLocator(7).tick_values(low, high))
         lines = ax.contour(
             *_finely(at_x, at_y, surface), levels=levels[(low < levels) & (levels < high)],
             colors="white", linewidths=0.6,
