@@ -32,10 +32,10 @@ ASPECTS: Final = {
 }  # fmt: skip
 DISPLACEMENTS: Final = tuple(f"displacement_{count}" for count in (1, 3, 10, 30, 100))
 FACTS: Final = {
-    **{name: f"moved in {name.rpartition('_')[2]} [mm]" for name in DISPLACEMENTS},
-    "speed_time": "memory of the speed [s]",
-    "wall_share": "near the wall [%]",
-    "rest_share": "at rest [%]",
+    **{name: f"moved in {name.rpartition('_')[2]} (mm)" for name in DISPLACEMENTS},
+    "speed_time": "memory of the speed (s)",
+    "wall_share": "near the wall (%)",
+    "rest_share": "at rest (%)",
 }
 HEAD: Final = """\
 # Every model on the eight real recordings

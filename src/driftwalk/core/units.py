@@ -58,6 +58,8 @@ _FACTOR: Final = re.compile(
     r"\s*([*·/]?)\s*([A-Za-zµμ]+|°|1)\s*(?:(?:\^|\*\*)?(-?\d+)|([²³]))?", re.ASCII
 )
 _SUPERSCRIPTS: Final = {"²": 2, "³": 3}
+RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""From signs and digits to those of a power."""
 
 
 def parse_quantity(text: str | float, unit: str) -> float:
@@ -199,6 +201,17 @@ def _expected(unit: str) -> str:
         return "a number"
     example = f" such as '{_EXAMPLES[unit]}'" if unit in _EXAMPLES else ""
     return f"a number in {unit} or a quantity{example}"
+
+
+def raised_powers(unit: str) -> str:
+    """Return a unit as print has it, with its powers raised.
+
+    Examples
+    --------
+    >>> raised_powers("rad2/s"), raised_powers("s-1"), raised_powers("1/s")
+    ('rad²/s', 's⁻¹', '1/s')
+    """
+    return re.sub(r"(?<=[^\W\d])-?\d+", lambda power: power[0].translate(RAISED), unit)
 
 
 def share_unit(words: Sequence[str]) -> list[str]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from driftwalk.figures.write import Figures
 from driftwalk.plot.assembly_courses import (
+    drawn_classes,
     plot_assembly_sizes,
     plot_attraction,
     plot_class_times,
@@ -115,9 +116,11 @@ def assembly_figures(
 
 def class_times_figure(times: xr.Dataset) -> Figure:
     """Return the classes over time next to the survival curves."""
-    figure, row = style.new_panels(1, 2, height_mm=75.0, width_ratios=[1.25, 1.0])
-    plot_class_times(times, row[0])
+    # 4.4 mm for the label of a class, 21 mm for title, axis and legend.
+    height = max(75.0, 4.4 * len(drawn_classes(times)) + 21.0)
+    figure, row = style.new_panels(1, 2, height_mm=height, width_ratios=[1.25, 1.0])
     plot_survival(times, row[1])
+    plot_class_times(times, row[0])
     style.letter_panels(row)
     return figure
 
@@ -130,7 +133,7 @@ def assembly_sizes_figure(
     times: xr.Dataset | None = None,
 ) -> Figure:
     """Return the sizes at the end, their mean and shares over time, and the survival curves."""
-    figure, panels = style.new_panels(2, 2, height_mm=130.0)
+    figure, panels = style.new_panels(2, 2, height_mm=145.0)
     plot_assembly_sizes(sizes, panels[0], beside=beside, labels=labels)
     plot_growth(sizes, panels[1], beside=beside, labels=labels)
     plot_growth(sizes, panels[2], beside=beside, labels=labels, what="shares")
@@ -214,7 +217,7 @@ def l1_map_figure(sensitivity: xr.Dataset) -> Figure:
 
 
 def class_panels_figure(sensitivity: xr.Dataset) -> Figure:
-    """Return the proportion of every class over the axes of the study."""
+    """Return the share of runs in every class over the axes of the study."""
     return style.figure_of(plot_class_panels(sensitivity)[0])
 
 

@@ -145,7 +145,7 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
     parameters = plot_parameters(calibration)
     if any(f"bootstrap_{one.name}" not in calibration for one in parameters):
         return _profiles_figure(calibration)
-    figure, row = style.new_panels(1, len(parameters) + 1, height_mm=68.0)
+    figure, row = style.new_panels(1, len(parameters) + 1, height_mm=74.0)
     plot_validation(calibration, row)
     style.letter_panels(row, [*(f"along {one.symbol}" for one in parameters), "estimates"])
     style.legend_above(figure, row[0], 7)
@@ -156,9 +156,7 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
         for handle, label in zip(*row[-1].get_legend_handles_labels(), strict=True)
         if label not in named and not label.startswith("optimum")
     }
-    row[-1].legend(
-        own.values(), own.keys(), loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2
-    )
+    style.legend_below(row[-1], 2, handles=own.values(), labels=own.keys())
     return figure
 
 

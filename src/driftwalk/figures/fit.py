@@ -22,6 +22,7 @@ from driftwalk.plot.model_check import (
 )
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
+from driftwalk.plot.parts.assembly_labels import percent
 from driftwalk.plot.parts.labels import in_unit
 from driftwalk.schema import FLAGS
 from driftwalk.schema.answers.force_law import compared_laws, shared_lengths
@@ -69,13 +70,18 @@ def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
     error = 10.0 * np.maximum(*(in_unit(flow[name], "cm/s", stored="m s-1") for name in names))
     shown = np.where(flow["flag"].values == FLAGS["measured"], error, np.nan)
     x, y = (in_unit(flow[axis], "cm", stored="m") for axis in ("x", "y"))
-    mesh = ax.pcolormesh(x, y, shown, cmap=style.speed_colormap(), vmin=0.0, shading="nearest")
+    # A few nodes at the rim, hardly visited, would make all others pale.
+    top = float(np.nanquantile(shown, 0.98)) if np.isfinite(shown).any() else 1.0
+    mesh = ax.pcolormesh(
+        x, y, shown, cmap=style.speed_colormap(), vmin=0.0, vmax=top, shading="nearest"
+    )
     mesh.set_rasterized(True)
     outline = draw_arena(ax, arena_of(flow, None))
     if outline is not None:
         mesh.set_clip_path(outline)
     label_position(ax)
-    style.add_colorbar(mesh, ax, "standard error (mm/s)")
+    beyond = bool(np.nanmax(shown, initial=0.0) > top)
+    style.add_colorbar(mesh, ax, "standard error (mm/s)", extend="max" if beyond else "neither")
     return ax
 
 
@@ -251,16 +257,16 @@ def plot_shared_stirring(fit: xr.Dataset, ax: Axes) -> Axes:
     """
     distance = in_unit(fit["body_distance"], "cm", stored="m")
     value, ends = fit["force_correlation"].values, fit["force_correlation_interval"].values.T
-    percent = f"{float(fit['confidence']):.0%}"
+    confidence = percent(fit["confidence"])
     ax.errorbar(
         distance, value, yerr=np.abs(ends - value), fmt="o", ms=3.0, lw=0.9, capsize=2.0,
-        color=style.BLUE, label=f"at each distance ({percent})",
+        color=style.BLUE, label=f"at each distance ({confidence})",
     )  # fmt: skip
     r = np.linspace(0.0, 1.05 * float(distance.max()), 200)
     low, length, high = (
         np.exp(-0.5 * (0.01 * r / max(one, 1e-9)) ** 2) for one in shared_lengths(fit)
     )
-    ax.fill_between(r, low, high, color=style.PALE, lw=0.0, label=f"its {percent} interval")
+    ax.fill_between(r, low, high, color=style.PALE, lw=0.0, label=f"its {confidence} interval")
     ax.plot(r, length, color=style.INK, label="exp(−r²/2L²)")
     ax.axhline(0.0, color=style.MUTED, lw=0.6)
     ax.set_xlim(0.0, float(r[-1]))

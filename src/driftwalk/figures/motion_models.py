@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.core.units import raised_powers
 from driftwalk.figures.write import Figures
 from driftwalk.plot.model_check import label_checks, plot_check_ratios, plot_own_aspects
 from driftwalk.plot.parts import style
+from driftwalk.plot.parts.assembly_labels import percent
 from driftwalk.plot.parts.labels import model_words
 from driftwalk.schema.answers.model_comparison import own_score
 from driftwalk.schema.answers.parts import each
@@ -112,7 +114,7 @@ def profiles_figure(calibration: xr.Dataset) -> Figure:
         ax.set_ylabel("rise of the misfit")
     figure.suptitle(
         f"{model_words(calibration.attrs['model'])}: misfit along each parameter, the others at "
-        f"their best (grey: {confidence:.0%} level; dashed: interval)"
+        f"their best (grey: {percent(confidence)} level; dashed: interval)"
     )
     return figure
 
@@ -184,7 +186,7 @@ def _label(calibration: xr.Dataset, index: int) -> str:
     one = calibration.isel(parameter=index)
     unit = str(one["unit"].values)
     words = fill(str(one["parameter"].values).replace("_", " "), width=11)
-    return words if unit == "1" else f"{words}\n({unit.replace('2', '²')})"
+    return words if unit == "1" else f"{words}\n({raised_powers(unit)})"
 
 
 def comparison_figures(comparison: xr.Dataset) -> Figures:

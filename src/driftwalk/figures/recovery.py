@@ -11,6 +11,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.figures.write import Figures
 from driftwalk.plot.parts import style
+from driftwalk.plot.parts.assembly_labels import percent
 from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
@@ -212,7 +213,7 @@ def _recovery_figure(recovery: xr.Dataset) -> Figure:
     handles, texts = rows[0].get_legend_handles_labels()
     figure.legend(handles, texts, loc="outside upper right", ncols=len(texts))
     confidence = float(recovery.attrs["confidence"])
-    drag = f"drag coefficient, {confidence:.0%} intervals"
+    drag = f"drag coefficient, {percent(confidence)} intervals"
     style.letter_panels(rows, [drag, "stochastic force", "flow"])
     return figure
 
@@ -354,7 +355,7 @@ def _model_figure(recovery: xr.Dataset) -> Figure:
     facts = recovery.attrs
     ax.set_title(
         f"{facts['model']}: {recovery.sizes['recording']} recordings of "
-        f"{float(facts['duration_s']):g} s, {float(facts['confidence']):.0%} intervals",
+        f"{float(facts['duration_s']):g} s, {percent(facts['confidence'])} intervals",
         loc="left",
     )
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)

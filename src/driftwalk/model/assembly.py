@@ -108,7 +108,7 @@ class Assembly(Section):
     relatch_clearance: Annotated[float, Quantity("1", ge=1, le=2)] = 1.25
     """Distance of the centres of blocks that parted, in sides, from which they may latch again."""
     confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.9
-    """Simultaneous confidence of the intervals of the proportions."""
+    """Simultaneous confidence of the intervals of the shares."""
 
     @classmethod
     def replaced_by(cls, keys: set[str]) -> set[str]:

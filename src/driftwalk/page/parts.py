@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError, InputError
 from driftwalk.core.text.json_text import json_value
+from driftwalk.core.units import RAISED, raised_powers
 from driftwalk.page.arrays import number, numbers
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.schema.answers.facts import facts_of, sentences, source_warnings
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 _PREFIXES: Final = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 _PREFIXED: Final = ("m", "s", "N", "m/s", "Hz")
-_RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def quantity(value: float, unit: str = "1", *, digits: int = 4) -> str:
@@ -45,8 +45,8 @@ def quantity(value: float, unit: str = "1", *, digits: int = 4) -> str:
     --------
     >>> quantity(0.000665, "N"), quantity(0.3825), quantity(1800.0, "s"), quantity(0.3, "m")
     ('0.665 mN', '0.3825', '30 min', '30 cm')
-    >>> quantity(7.076e-9, "N² s"), quantity(0.0042, "m2"), quantity(0.3, "rad2/s")
-    ('7.076×10⁻⁹ N² s', '0.0042 m²', '0.3 rad²/s')
+    >>> quantity(7.076e-9, "N² s"), quantity(0.0042, "m2"), quantity(0.3, "1/s")
+    ('7.076×10⁻⁹ N² s', '0.0042 m²', '0.3 1/s')
     """
     if not math.isfinite(value):
         return "unknown"
@@ -61,7 +61,7 @@ def quantity(value: float, unit: str = "1", *, digits: int = 4) -> str:
     if unit == "N" and 1e-5 <= abs(value) < 1.0:
         return f"{_digits(1e3 * value, digits)} mN"
     if unit not in _PREFIXED or value == 0.0:
-        return f"{_digits(value, digits)} {unit.translate(_RAISED)}"
+        return f"{_digits(value, digits)} {raised_powers(unit)}"
     power = 3 * math.floor(math.log10(abs(value)) / 3.0 + 1e-12)
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
     return f"{_digits(value / 10.0**power, digits)} {_PREFIXES[power]}{unit}"
@@ -131,7 +131,7 @@ def _digits(value: float, digits: int) -> str:
     """Return a number with so many significant digits, powers of ten written as such."""
     text = f"{value:.{digits}g}"
     mantissa, _, power = text.partition("e")
-    return f"{mantissa}×10{str(int(power)).translate(_RAISED)}" if power else text
+    return f"{mantissa}×10{str(int(power)).translate(RAISED)}" if power else text
 
 
 Section = dict[str, Any]

@@ -58,7 +58,7 @@ GROWTH: Final = {
 def plot_class_times(
     times: xr.Dataset, ax: Axes | None = None, *, form: Literal["lines", "stacked"] = "stacked"
 ) -> Axes:
-    """Draw the proportion of runs in every outcome class over time, labelled at the right edge.
+    """Draw the share of runs in every outcome class over time, labelled at the right edge.
 
     Hues are classes of one assembly, greys those of several. Of more than 16 classes, those that
     reach 1 % at some time are shown, at most 20, and the sum of the rest as "other".
@@ -111,8 +111,8 @@ def plot_class_times(
         height = proportion[:, -1]
     # Those too that are empty at the end: their areas have no other name.
     kept = np.flatnonzero(proportion.max(axis=1) > 0.0)
-    _label_right(ax, [names[index] for index in kept], height[kept], colors)
-    ax.set(xlabel=TIME_LABEL, ylabel="proportion of runs")
+    label_right(ax, [names[index] for index in kept], height[kept], colors)
+    ax.set(xlabel=TIME_LABEL, ylabel="share of runs")
     ax.spines[["top", "right"]].set_visible(False)
     ax.set_title(runs_text(times), loc="left")
     return ax
@@ -199,19 +199,22 @@ def plot_survival(times: xr.Dataset, ax: Axes | None = None) -> Axes:
                 time, times[f"{name}_low"].values, times[f"{name}_high"].values, color=color,
                 alpha=0.2, lw=0,
             )  # fmt: skip
-    ax.set(
-        xlim=(time[0], time[-1]), ylim=(0.0, 1.02), xlabel=TIME_LABEL, ylabel="proportion of runs"
-    )
+    ax.set(xlim=(time[0], time[-1]), ylim=(0.0, 1.02), xlabel=TIME_LABEL, ylabel="share of runs")
     ax.spines[["top", "right"]].set_visible(False)
     confidence = number_fact(times, "confidence")
     bands = f"bands: {percent(confidence)}" if np.isfinite(confidence) else ""
     ax.set_title(", ".join(part for part in (runs_text(times), bands) if part), loc="left")
-    ax.legend(loc="upper right")
+    style.legend_below(ax, 1)
     return ax
 
 
+def drawn_classes(times: xr.Dataset) -> list[str]:
+    """Return the names of the classes that `plot_class_times` labels."""
+    return [name for name, share in zip(*_shown(times), strict=True) if share.max() > 0.0]
+
+
 def _shown(times: xr.Dataset) -> tuple[list[str], Floats]:
-    """Return the names drawn and their proportions (class, time)."""
+    """Return the names drawn and their shares (class, time)."""
     names = class_names(times)
     proportion = np.asarray(times["proportion"].transpose("class", "time").values, dtype=np.float64)
     shown = classes_to_show(names, proportion.T)
@@ -219,8 +222,9 @@ def _shown(times: xr.Dataset) -> tuple[list[str], Floats]:
     return [*(names[index] for index in shown), *others], with_rest(proportion, shown)
 
 
-def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, str]) -> None:
+def label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, str]) -> None:
     """Put sketch and name of every class at its end, moved apart where they would meet."""
+    style.settle_layout(ax)
     total_pt = float(style.axes_points(ax)[1])
     low, high = ax.get_ylim()
     share = (height - low) / (high - low)
@@ -333,17 +337,18 @@ def plot_assembly_sizes(
         check_kind(one, "assembly_sizes", "size", "size_to", "block_share")
     ax = style.axes_or_new(ax, height_mm=65.0)
     place = np.arange(sizes.sizes["size"])
-    width = BAR_WIDTH / len(both)
+    height = BAR_WIDTH / len(both)
     for index, (one, color) in enumerate(zip(both, (style.BLUE, style.ORANGE), strict=False)):
         share, low, high = (one[f"block_share{end}"].values for end in ("", "_low", "_high"))
-        ax.bar(
-            place + (index - (len(both) - 1) / 2) * width, share, width, color=color,
-            yerr=None if np.isnan(low).any() else [share - low, high - share],
+        ax.barh(
+            place + (index - (len(both) - 1) / 2) * height, share, height, color=color,
+            xerr=None if np.isnan(low).any() else [share - low, high - share],
             error_kw={"elinewidth": 0.8}, label=labels[index] or None,
         )  # fmt: skip
     ends = zip(sizes["size"].values, sizes["size_to"].values, strict=True)
-    ax.set_xticks(place, [str(a) if a == b else f"{a}–{b}" for a, b in ends], rotation=45)
-    ax.set(ylim=(0.0, None), xlabel="blocks in the assembly", ylabel="share of the blocks")
+    ax.set_yticks(place, [str(a) if a == b else f"{a}–{b}" for a, b in ends])
+    ax.set(xlim=(0.0, None), xlabel="share of the blocks", ylabel="blocks in the assembly")
+    ax.invert_yaxis()
     _finish(ax, both)
     return ax
 
@@ -423,4 +428,4 @@ def _finish(ax: Axes, both: list[xr.Dataset]) -> None:
     intervals = f"intervals: {percent(both[0].attrs['confidence'])}"
     ax.set_title(", ".join(part for part in (runs_text(both[0]), intervals) if part), loc="left")
     if ax.get_legend_handles_labels()[1]:
-        ax.legend()
+        style.legend_below(ax, 2)

@@ -8,7 +8,7 @@ import numpy as np
 
 from driftwalk.plot.assembly_courses import TIME_LABEL
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind
+from driftwalk.plot.parts.assembly_labels import check_kind, percent
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -100,9 +100,11 @@ def plot_control_shares(test: xr.Dataset, ax: Axes | None = None) -> Axes:
         place = time[-1:].repeat(2) + 0.02 * (at + 1) * (time[-1] - time[0])
         ax.plot(place, np.ravel(ends), color=line.get_color(), lw=2.0, alpha=0.5)
     ax.set_xlabel(TIME_LABEL)
-    ax.set_ylabel(f"share in {short_class(str(test.attrs['target']))}")
-    ax.set_ylim(bottom=0.0)
-    ax.legend()
+    ax.set_ylabel(f"share of runs in {short_class(str(test.attrs['target']))}")
+    ax.set(xlim=(time[0], None), ylim=(0.0, None))
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.set_title(f"bars: {percent(test.attrs['confidence'])} intervals at the end", loc="left")
+    style.legend_below(ax, 2)
     return ax
 
 

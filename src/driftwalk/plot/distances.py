@@ -125,6 +125,8 @@ def plot_refined_map(
     --------
     ``plot_refined_map(calibration).figure.savefig("refined.png")``
     """
+    from matplotlib.ticker import MaxNLocator
+
     require_variables(calibration, "refined_ks_distance", "refined_surface")
     across, up = plane_of(calibration)
     dims = (f"refined_{up.name}", f"refined_{across.name}")
@@ -146,7 +148,13 @@ def plot_refined_map(
     lines = None
     if min(surface.shape) >= 2 and np.isfinite(surface).any():
         at_x, at_y = (one.values(calibration, "refined_") for one in (across, up))
-        lines = ax.contour(*_finely(at_x, at_y, surface), levels=6, colors="white", linewidths=0.6)
+        # Only levels of the colour bar: a polynomial may leave what a score can be.
+        low, high = mesh.get_clim()
+        levels = np.asarray(MaxNLocator(7).tick_values(low, high))
+        lines = ax.contour(
+            *_finely(at_x, at_y, surface), levels=levels[(low < levels) & (levels < high)],
+            colors="white", linewidths=0.6,
+        )  # fmt: skip
     _draw_region(ax, calibration)
     draw_optimum(ax, calibration)
     ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])

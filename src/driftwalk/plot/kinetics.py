@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats
-from driftwalk.plot.assembly_courses import TIME_LABEL
+from driftwalk.plot.assembly_courses import TIME_LABEL, label_right
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import check_kind, class_colors, class_names
 from driftwalk.plot.parts.polyomino_sketch import (
     are_discs,
     class_cells,
+    name_text,
     place_sketch,
     sketch_size,
 )
-from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,10 +24,16 @@ if TYPE_CHECKING:
 
 SHOWN_SHARE = 0.01
 """Classes that reach this share are drawn, and the transitions with this part of what leaves."""
+MOST_ROWS: Final = 8
+"""Classes of one column: as many as one page is high enough for; chosen by eye."""
 CLASS_PT = 28.0
 """Diameter of the circle about the sketch of a class [pt]; chosen by eye."""
 APART_PT = 3.5
 """Half of the distance between an arrow there and the one back [pt]; chosen by eye."""
+MARGINS_PT: Final = ((30.0, 30.0), (30.0, 17.0))
+"""Room around the middle of a circle for itself and its name, across and up [pt]; chosen by eye."""
+WORD: Final = np.array([0.5, 1.0])
+"""A word is twice as wide as high: how near two are counts by these weights, across and up."""
 GRAPH_TITLE: Final = "rates (per 1000 s); width: share of what leaves the class"
 GROUND: Final[dict[str, Any]] = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"}
 WORDS_ZORDER: Final = 5.0
@@ -60,13 +66,12 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     ``plot_class_graph(found)``
     """
-    place, rows, kept = class_graph_of(kinetics)
+    place, rows, kept, title = class_graph_of(kinetics)
     ax = _axes_for(len(place), rows) if ax is None else ax
-    ax.set_xlim(-0.12, 1.12)
-    ax.set_ylim(-0.12, 1.1)
     ax.set_axis_off()
-    ax.set_title(GRAPH_TITLE, loc="left")
+    ax.set_title(title, loc="left")
     style.settle_layout(ax)
+    _fill(ax, np.array([*place.values()]))
     unit = style.axes_points(ax) / np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
     discs = are_discs(*place)
     for arrow in placed_arrows(place, kept, unit):
@@ -85,7 +90,7 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
         side = 20.0 / float(sketch_size(class_cells(name)).max())
         place_sketch(ax, name, at, cell_pt=min(side, 6.0), color=colors[name], discs=discs)
         ax.annotate(
-            short_class(name), at, xytext=(0, -17), textcoords="offset points", ha="center",
+            name_text(name), at, xytext=(0, -17), textcoords="offset points", ha="center",
             va="top", zorder=WORDS_ZORDER, bbox=GROUND,
         )  # fmt: skip
     return ax
@@ -111,8 +116,8 @@ Transition = tuple[str, str, float, float]
 
 def class_graph_of(
     kinetics: xr.Dataset,
-) -> tuple[dict[str, tuple[float, float]], int, list[Transition]]:
-    """Return places of the classes, how many stand in a column, and the transitions."""
+) -> tuple[dict[str, tuple[float, float]], int, list[Transition], str]:
+    """Return places of the classes, how many stand in a column, the transitions, and a title."""
     check_kind(kinetics, "kinetics", "rate", "count", "share")
     rates, counts = (kinetics[name].isel(source=0).values for name in ("rate", "count"))
     pairs = [str(name).split(" -> ") for name in kinetics["transition"].values]
@@ -124,7 +129,22 @@ def class_graph_of(
         for (start, end), rate, count in zip(pairs, rates, counts, strict=True)
         if count > SHOWN_SHARE * leaving[start]
     ]
-    return *_places(list(dict.fromkeys(name for one in kept for name in one[:2]))), kept
+    every = list(dict.fromkeys(name for one in kept for name in one[:2]))
+    largest = dict(zip(class_names(kinetics), kinetics["share"].values.max(axis=0), strict=True))
+    place, rows = _places(_largest(every, largest))
+    kept = [one for one in kept if one[0] in place and one[1] in place]
+    left_out = len(every) - len(place)
+    title = f"{GRAPH_TITLE}; {left_out} rarer classes are left out" if left_out else GRAPH_TITLE
+    return place, rows, kept, title
+
+
+def _largest(names: list[str], largest: dict[str, float]) -> list[str]:
+    """Return the classes whose share is largest at some time, in each column as many as fit."""
+    kept: list[str] = []
+    for number in {name.count("+") for name in names}:
+        column = [name for name in names if name.count("+") == number]
+        kept += sorted(column, key=lambda name: -largest[name])[:MOST_ROWS]
+    return [name for name in names if name in kept]
 
 
 def placed_arrows(
@@ -159,11 +179,19 @@ def _axes_for(classes: int, rows: int) -> Axes:
     return figure.add_subplot()
 
 
+def _fill(ax: Axes, places: Floats) -> None:
+    """Let the outermost circles with their names reach to the edges of the axes."""
+    for at, (low_pt, high_pt) in enumerate(MARGINS_PT):
+        low, high = places[:, at].min(), places[:, at].max()
+        pt = ((high - low) or 1.0) / (style.axes_points(ax)[at] - low_pt - high_pt)
+        (ax.set_xlim, ax.set_ylim)[at](low - low_pt * pt, high + high_pt * pt)
+
+
 def _free_place(first: Floats, last: Floats, taken: list[Floats], unit: Floats) -> float:
     """Return the share of an arrow that is farthest from all labels and classes so far."""
     shares = np.linspace(0.25, 0.7, 19)
     places = first + shares[:, None] * (last - first)
-    off = [min(np.hypot(*(unit * (place - other))) for other in taken) for place in places]
+    off = [min(np.hypot(*(WORD * unit * (place - other))) for other in taken) for place in places]
     return float(shares[int(np.argmax(off))])
 
 
@@ -209,17 +237,18 @@ def plot_predicted_shares(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     time: Floats = kinetics["time"].values
     largest = kinetics["share"].values.max(axis=0)
     names = class_names(kinetics)
-    shown = [at for at in np.argsort(-largest, kind="stable")[:12] if largest[at] > SHOWN_SHARE]
+    ranked = np.argsort(-largest, kind="stable")[:12].tolist()
+    shown = sorted(at for at in ranked if largest[at] > SHOWN_SHARE)
     colors = class_colors(names)
-    for at in sorted(shown):
+    for at in shown:
         one, color = kinetics.isel({"class": at}), colors[names[at]]
         ax.fill_between(time, one["share_low"], one["share_high"], color=color, alpha=0.25, lw=0)
-        ax.plot(time, one["share"], color=color, label=short_class(names[at]))
+        ax.plot(time, one["share"], color=color, label=names[at])
         for source, marker in zip(range(kinetics.sizes["source"]), "ox", strict=False):
             seen = one["empirical"].values[source]
             ax.plot(time[::6], seen[::6], marker, color=color, ms=2.5, mew=0.7)
     ax.set(xlabel=TIME_LABEL, ylabel="share of runs", xlim=(time[0], time[-1]), ylim=(0.0, None))
-    ax.legend(ncols=2)
+    label_right(ax, [names[at] for at in shown], kinetics["share"].values[-1, shown], colors)
     ax.spines[["top", "right"]].set_visible(False)
     both = [f"{marker} {one}" for marker, one in zip("●×", kinetics["source"].values, strict=False)]
     points = " and ".join(both) if len(both) > 1 else "points"

@@ -10,6 +10,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
+from driftwalk.plot.parts.assembly_labels import percent
 from driftwalk.plot.parts.labels import ANGLE_LABEL, LENGTH_LABEL, in_unit, ratio_axis
 from driftwalk.schema.answers.fit import residuals_of
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_LABELS
@@ -226,7 +227,7 @@ def plot_predicted_steps(
         scale * check[f"{show}_density_{part}"].values
         for part in ("low", "median", "high", "recording")
     )
-    band = f"{check.attrs['band']:.0%} of simulated recordings".replace("%", " %")
+    band = f"{percent(check.attrs['band'])} of simulated recordings"
     ax.stairs(high, edge, baseline=low, fill=True, color=style.BLUE, alpha=0.3, lw=0, label=band)
     ax.stairs(median, edge, color=style.BLUE, lw=0.9, label="their median", baseline=None)
     ax.stairs(real, edge, color=style.ORANGE, lw=1.1, label="recording", baseline=None)
@@ -313,7 +314,7 @@ def plot_own_aspects(found: xr.Dataset, ax: Axes, *, label: str) -> None:
     place = np.arange(len(aspects))
     ax.plot(found["own_distance"].values, place, "|", ms=9.0, mew=1.4, color=style.INK, label=label)
     ax.set_yticks(place, [ASPECT_WORDS.get(name, name) for name in aspects])
-    ax.invert_yaxis()
+    ax.set_ylim(len(aspects) - 0.4, -0.6)
     ax.set(xlim=(0.0, None), xlabel="KS distance D")
 
 
@@ -339,5 +340,5 @@ def label_checks(found: xr.Dataset, ax: Axes) -> None:
     ax.axvline(1.0, color=style.INK, lw=0.6)
     ratio_axis(ax)
     ax.set_yticks(np.arange(len(names)), [CHECK_LABELS.get(name, name) for name in names])
-    ax.invert_yaxis()
+    ax.set_ylim(len(names) - 0.4, -0.6)
     ax.set_xlabel("model / recording")

@@ -44,7 +44,7 @@ def plot_outcomes(
     labels: tuple[str, str] = ("", ""),
     realisations: xr.Dataset | None = None,
 ) -> Axes:
-    """Draw the proportion of every outcome class as a bar over the sketch of the class.
+    """Draw the share of runs in every outcome class as a bar over the sketch of the class.
 
     Thin lines are simultaneous intervals: with the stated confidence all of them hold at once.
     Diamonds are mean ± standard deviation over realisations. Up to 16 classes are all shown; of
@@ -109,7 +109,7 @@ def plot_outcomes(
         _draw_realisations(ax, at + 0.22 * width, realisations, names, shown)
     ax.set(xlim=(-0.6, len(drawn) - 0.4), ylim=(0.0, None))
     rest = f" (other: {len(names) - len(shown)} rarer classes)" if OTHER in drawn else ""
-    ax.set_ylabel("proportion of runs")
+    ax.set_ylabel("share of runs")
     ax.spines[["top", "right"]].set_visible(False)
     _divide(ax, drawn)
     _legend(ax, both)
@@ -126,14 +126,14 @@ def _new_axes(*, wide: bool) -> Axes:
 
 
 def _on_classes(proportion: xr.DataArray, names: list[str]) -> Floats:
-    """Return proportions in the order of `names`, zero for a class that the dataset lacks."""
+    """Return shares in the order of `names`, zero for a class that the dataset lacks."""
     aligned = proportion.reindex({"class": np.array(names, dtype=object)}, fill_value=0.0)
     return np.asarray(aligned.values, dtype=np.float64)
 
 
 def _bars(dataset: xr.Dataset, names: list[str], shown: list[int]) -> Bars:
     proportion = _on_classes(dataset["proportion"], names)
-    # A class that the dataset does not list has a proportion of 0, and no interval.
+    # A class that the dataset does not list has a share of 0, and no interval.
     listed = np.isin(names, class_names(dataset))
     ends = (
         np.where(listed, _on_classes(dataset[f"interval_{end}"], names), np.nan) for end in _ENDS

@@ -135,9 +135,9 @@ def plot_data_widths(posterior: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_yticks(place, kinds)
     ax.invert_yaxis()
     ax.set(
-        xlabel=f"median 90 % interval over that without data\n{posterior.attrs['runs']} runs",
-        xlim=(0.0, 1.1),
-    )
+        xlabel="median 90 % interval over that without data", xlim=(0.0, 1.1),
+    )  # fmt: skip
+    ax.set_title(f"{posterior.attrs['runs']} runs", loc="left")
     ax.spines[["top", "right"]].set_visible(False)
-    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=size)
+    style.legend_below(ax, 2)
     return ax

@@ -117,7 +117,7 @@ def plot_class_panels(
     classes: Sequence[str] | None = None,
     columns: int = 5,
 ) -> list[Axes]:
-    """Draw the proportion of every outcome class over the axes of a sensitivity study.
+    """Draw the share of runs in every outcome class over the axes of a sensitivity study.
 
     One panel per class, all with one scale. Two axes of numbers give maps, other axes points.
 
@@ -180,7 +180,7 @@ def plot_class_panels(
         if labels:
             style.figure_of(panels[0]).legend(handles, labels, loc="outside upper center", ncols=4)
     if mapped:
-        style.add_colorbar(panels[0].collections[0], panels, "proportion of runs")
+        style.add_colorbar(panels[0].collections[0], panels, "share of runs")
     return panels
 
 

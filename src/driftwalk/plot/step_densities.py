@@ -264,8 +264,8 @@ def plot_density_panels(
     """Draw four densities: recording, low, best and high value of one parameter.
 
     Other parameters stay at their optimum. Simulated panels show the settings of the coarse map
-    nearest to the values asked for, and their titles name the values shown. All four share their
-    axes and their colour scale.
+    nearest to the values asked for, and their titles name the values shown; with the optimum at an
+    end of the map, the second of them is halfway. All four share their axes and their colour scale.
 
     Parameters
     ----------
@@ -339,7 +339,10 @@ def choose_settings(
     low: float | None = None,
     high: float | None = None,
 ) -> list[Setting]:
-    """Return the low, best and high setting of the coarse map nearest to the values wanted."""
+    """Return the low, best and high setting of the coarse map nearest to the values wanted.
+
+    Where the best is at an end of the map, the second is halfway to the other end.
+    """
     require_variables(
         calibration, "step_density", "recording_step_density", "step_length_edge",
         "turning_angle_edge", *(one.name for one in plot_parameters(calibration)),
@@ -353,7 +356,11 @@ def choose_settings(
         best[along.name],
         HIGH_FACTOR * best[along.name] if high is None else high,
     )
-    return [_nearest(calibration, {**best, along.name: value}) for value in wanted]
+    cells = calibration[along.name].sel({along.name: list(wanted)}, method="nearest")
+    first, middle, last = cells.values.tolist()
+    if middle in (first, last):  # an optimum at an end of the map is not shown twice
+        middle = (first + last) / 2.0
+    return [_nearest(calibration, {**best, along.name: value}) for value in (first, middle, last)]
 
 
 def _nearest(calibration: xr.Dataset, values: dict[str, float]) -> Setting:

@@ -101,7 +101,8 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     check_kind(found, "yield", "difference", "standing")
-    ax = style.axes_or_new(ax, height_mm=90.0)
+    # 6 mm for a setting, 32 mm for legend and axis.
+    ax = style.axes_or_new(ax, height_mm=6.0 * min(found.sizes["setting"], MOST_SETTINGS) + 32.0)
     behind = found["difference"].values
     order = np.argsort(behind + (found["standing"].values == "worse"), kind="stable")
     order = order[:MOST_SETTINGS]
@@ -121,7 +122,7 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.axvspan(-within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"within {100 * within:g} %")
     words, shared = _setting_labels(found, order)
     ax.set_yticks(range(len(order)), words)
-    ax.invert_yaxis()
+    ax.set_ylim(len(order) - 0.4, -0.6)
     ax.locator_params(axis="x", nbins=5)
     ax.set_xlabel("\n".join(filter(None, ["yield less that of the best", shared])))
     ax.spines[["top", "right"]].set_visible(False)

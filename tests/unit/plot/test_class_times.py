@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given, settings, strategies as st
 from matplotlib.collections import PolyCollection
 from matplotlib.offsetbox import AnnotationBbox
@@ -12,6 +13,7 @@ from synthetic_assembly import class_times, outcome_classes
 
 from driftwalk.core.errors import InputError
 from driftwalk.plot.assembly_courses import plot_class_times, plot_survival, spread_apart
+from driftwalk.plot.kinetics import class_graph_of
 from driftwalk.plot.parts.assembly_labels import class_colors
 from driftwalk.plot.parts.style import print_style
 
@@ -131,3 +133,17 @@ def test_places_are_moved_as_little_as_possible() -> None:
         options={"ftol": 1e-12},
     )
     np.testing.assert_allclose(place, best.x, atol=1e-5)
+
+
+def test_the_graph_of_classes_shows_the_largest_of_a_column() -> None:
+    names = ["1+1", *(f"end{number}" for number in range(12))]
+    one_each = (("source", "transition"), np.ones((1, 12)))
+    kinetics = xr.Dataset(
+        {"rate": one_each, "count": one_each, "share": (("time", "class"), [np.arange(13.0)])},
+        coords={"class": names, "transition": [f"1+1 -> {name}" for name in names[1:]]},
+        attrs={"kind": "kinetics"},
+    )
+    place, rows, kept, title = class_graph_of(kinetics)
+    assert set(place) == {"1+1", *names[-8:]}
+    assert (rows, len(kept)) == (8, 8)
+    assert title.endswith("4 rarer classes are left out")

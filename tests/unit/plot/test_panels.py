@@ -33,6 +33,11 @@ def test_settings_are_the_nearest_of_the_grid(calibration) -> None:
     assert [s.values["drag_coefficient"] for s in settings] == pytest.approx([0.4] * 3)
 
 
+def test_an_optimum_at_an_end_of_the_map_is_shown_once(calibration) -> None:
+    settings = choose_settings(calibration, parameter="drag_coefficient", low=0.4, high=0.8)
+    assert [s.values["drag_coefficient"] for s in settings] == pytest.approx([0.4, 0.6, 0.8])
+
+
 @pytest.mark.slow
 def test_panels_hold_the_stored_densities_on_one_scale(calibration) -> None:
     row = plot_density_panels(calibration)

@@ -24,7 +24,7 @@ from driftwalk.page.parts import (
     value_of,
 )
 from driftwalk.page.sections.outcomes import cells_of, class_times_section
-from driftwalk.plot.kinetics import GRAPH_TITLE, class_graph_of, placed_arrows
+from driftwalk.plot.kinetics import class_graph_of, placed_arrows
 from driftwalk.plot.parts.polyomino_sketch import are_discs
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.kinetics import (
@@ -155,10 +155,10 @@ def shares_sections(kinetics: xr.Dataset) -> list[Section]:
 
 def graph_section(kinetics: xr.Dataset) -> Section:
     """Return the classes by their number of assemblies, and the rates between them as arrows."""
-    place, rows, kept = class_graph_of(kinetics)
+    place, rows, kept, title = class_graph_of(kinetics)
     unit = np.array([GRAPH_PX, ROW_PX * rows])
     return section(
-        "graph", "class_graph", "Graph of the classes", f"{GRAPH_TITLE.capitalize()}.",
+        "graph", "class_graph", "Graph of the classes", f"{title.capitalize()}.",
         height=float(unit[1]),
         classes=[
             {"class": name, "x": x, "y": y, "cells": cells_of(name, discs=are_discs(*place))}

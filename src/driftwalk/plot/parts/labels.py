@@ -11,6 +11,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import raised_powers
 from driftwalk.schema.answers.facts import facts_of
 from driftwalk.schema.description import Number
 from driftwalk.schema.parameters import StoredParameter, is_block, stored_parameters
@@ -216,7 +217,9 @@ def plot_parameters(calibration: xr.Dataset) -> tuple[PlotParameter, ...]:
     if is_block(calibration):
         return DRAG, FORCE
     return tuple(
-        PlotParameter(stored, stored.label, "" if stored.unit == "1" else stored.unit)
+        PlotParameter(
+            stored, stored.label, "" if stored.unit == "1" else raised_powers(stored.unit)
+        )
         for stored in stored_parameters(calibration)
     )
 

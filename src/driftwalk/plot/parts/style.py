@@ -245,8 +245,24 @@ def legend_above(figure: Figure, ax: Axes, columns: int) -> None:
     figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=columns)
 
 
+def legend_below(ax: Axes, columns: int, **named: Any) -> None:
+    """Put a legend under the label of the horizontal axis, where no data can be."""
+    from matplotlib.transforms import ScaledTranslation
+
+    # Numbers and label of the axis are 28 pt high.
+    down = ScaledTranslation(0.0, -30.0 / 72.0, figure_of(ax).dpi_scale_trans)
+    ax.legend(
+        **named, loc="upper center", ncols=columns, borderaxespad=0.0,
+        bbox_to_anchor=(0.5, 0.0), bbox_transform=ax.transAxes + down,
+    )  # fmt: skip
+
+
 def letter_panels(axes: list[Axes], titles: list[str] | None = None) -> None:
-    """Title panels "(a) …", "(b) …" at their left edge; without titles their own stay."""
+    """Title panels "(a) …", "(b) …" at their left edge; without titles their own stay.
+
+    One panel alone has no letter.
+    """
     titles = [ax.get_title(loc="left") for ax in axes] if titles is None else titles
     for index, (ax, title) in enumerate(zip(axes, titles, strict=True)):
-        ax.set_title(f"({chr(ord('a') + index)}) {title}", loc="left")
+        letter = f"({chr(ord('a') + index)}) " if len(axes) > 1 else ""
+        ax.set_title(f"{letter}{title}", loc="left")

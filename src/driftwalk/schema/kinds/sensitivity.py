@@ -130,7 +130,7 @@ variables:
     loading(class component) [1]: loading of the class
     explained_variance_ratio(component) [1]: share of the variance over settings
     complete_correlation(component) [1]: correlation of the score with the share of complete runs
-    mean(class) [1]: mean proportion over settings
+    mean(class) [1]: mean share over settings
     class(class) text: outcome class
     component [1] int
 attributes:

@@ -1,4 +1,4 @@
-"""A study of self-assembly under way: the proportions of the classes, as runs end."""
+"""A study of self-assembly under way: the shares of the classes, as runs end."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class RunningAssembly(Running):
         return self.sections() if units else []
 
     def sections(self) -> list[Section]:
-        """Return the proportions of the classes up to now."""
+        """Return the shares of the classes up to now."""
         confidence = self._study.assembly.confidence
         return [
             section(
