@@ -87,7 +87,7 @@ def main() -> None:
     searches = read_lines(Path(sys.argv[2])) if len(sys.argv) > 2 else []
     models = list(dict.fromkeys(line["model"] for line in lines))
     head = ["determined", "median error of these", "in the 90 % interval", "of all"]
-    by_model = [["model", "recordings", "matched", "explained", *head, "processor time [s]"]]
+    by_model = [["model", "recordings", "matched", "explained", *head, "processor time (s)"]]
     stages = ["search alone: median error", "summaries, same recordings"]
     by_parameter = [["model", "parameter", *head, *(stages if searches else [])]]
     every: list[tuple[float, bool, bool]] = []
