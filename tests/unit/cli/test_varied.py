@@ -46,6 +46,14 @@ def test_words_keep_their_own_form() -> None:
     }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    "values", ["none,3x3x1mm,1.2T,5x5x2mm,1300mT", "none;3x3x1mm,1.2T; 5x5x2mm,1300mT"]
+)
+def test_magnets_are_parted_by_commas_or_semicolons(values: str) -> None:
+    found = read_varied([f"magnets={values}"], AXES, listed_values)
+    assert found == {AXES["magnets"]: ["none", "3x3x1mm,1.2T", "5x5x2mm,1300mT"]}
+
+
 def test_a_number_without_a_unit_after_one_with_a_unit_is_refused() -> None:
     with pytest.raises(InputError, match=r"force-std=1mN,0\.5: '0\.5' has no unit"):
         vary_strengths(["force-std=1mN,0.5"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Final
 
@@ -20,7 +21,8 @@ def read_varied(
     Parameters
     ----------
     given : sequence of str
-        Such as ``"blocks=2,3,4"``; values with commas of their own are parted by semicolons.
+        Such as ``"blocks=2,3,4"``; values with commas of their own are parted by semicolons;
+        magnets also by the comma after ``none`` or a remanence in T.
     names : mapping of str to str
         Keys by the names that an option may have.
     read : callable
@@ -43,8 +45,8 @@ def read_varied(
         if key in found:
             raise InputError(f"--vary {text}: {word} is varied twice; name all values at once")
         # The values of magnets, and of faces, have commas of their own: "none; 3x3x1mm,1.2T".
-        parted = word == "magnets" or ";" in values
-        words = [one.strip() for one in values.split(";" if parted else ",")]
+        comma = "(?<=none),|(?<=T)," if word == "magnets" else ","
+        words = [one.strip() for one in re.split(";" if ";" in values else comma, values)]
         try:
             if not all(words):
                 raise ConfigurationError(f"a value is missing after '{word}='")
