@@ -145,6 +145,10 @@ def run_tests(tests: list[str], file: str, code: str) -> str:
 def judge(mutant: Mutant, tests_of: dict[str, dict[str, list[str]]], cost: dict[str, float]) -> Any:
     """Return what the fast tests say about a mutant, and how many ran."""
     code = mutated(mutant)
+    try:
+        ast.parse(code)
+    except SyntaxError:
+        return {"line": changed_line(mutant, code), "fast": "invalid", "tests": 0}
     lines = tests_of.get(mutant.file, {})
     seen = set(lines.get(str(mutant.place[0][0]), []))
     found = {"line": changed_line(mutant, code), "fast": "survived", "tests": 0}
