@@ -10,16 +10,19 @@ import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
-import coverage
 import pytest
 from mutate import ROOMS, ROOT
 
-_COVERAGE = coverage.Coverage(
-    data_file=None, source=[str(ROOT / "src/driftwalk" / room) for room in ROOMS]
-)
+_COVERAGE: Any = None
 _COST: dict[str, float] = {}
-_COVERAGE.start()  # before the rooms are imported
+if "MAP" in os.environ:
+    import coverage
+
+    rooms = [str(ROOT / "src/driftwalk" / room) for room in ROOMS]
+    _COVERAGE = coverage.Coverage(data_file=None, source=rooms)
+    _COVERAGE.start()  # before the rooms are imported
 
 
 @pytest.hookimpl(hookwrapper=True)
