@@ -312,12 +312,7 @@ def use_angle(many: Sequence[xr.Dataset], tracks: Sequence[Track], wanted: str) 
     """Return how orientations are used: "state", "given" or "none"."""
     if wanted not in ("auto", "state", "given", "none"):
         raise InputError(f"angle must be 'auto', 'state', 'given' or 'none', got {wanted!r}")
-    shares = []
-    for track in tracks:
-        known = np.isfinite(track.theta)
-        # A tracker that only fills its column has no orientation.
-        filled = not known.any() or np.ptp(track.theta[known]) == 0.0
-        shares.append(0.0 if filled else float(known.mean()))
+    shares = [float(np.isfinite(track.theta).mean()) if track.turns else 0.0 for track in tracks]
     seen = min(shares)
     if wanted in ("state", "given") and seen == 0.0:
         where = prefix_of(many[shares.index(seen)])

@@ -40,6 +40,12 @@ class Track(NamedTuple):
         """Whether any sample carries an orientation."""
         return bool(np.isfinite(self.theta).any())
 
+    @property
+    def turns(self) -> bool:
+        """Whether orientations differ: a tracker that only fills its column has none."""
+        known = self.theta[np.isfinite(self.theta)]
+        return bool(known.size) and float(np.ptp(known)) > 0.0
+
 
 def build_trajectory(
     time: npt.ArrayLike,

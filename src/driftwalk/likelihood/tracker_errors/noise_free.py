@@ -70,13 +70,10 @@ def with_least_noise(track: Track, *, side: float, number: int) -> tuple[Track, 
     )
     if not position:
         return track, AddedNoise(0.0, 0.0)
-    known = track.theta[np.isfinite(track.theta)]
-    # A tracker that only fills its column has no orientation.
-    turns = known.size > 0 and np.ptp(known) > 0.0
     orientation = _lacking(
         own.orientation_noise_rad,
         own.orientation_noise_standard_error_rad,
-        LEAST_NOISE.orientation_rad if turns else 0.0,
+        LEAST_NOISE.orientation_rad if track.turns else 0.0,
     )
     added = AddedNoise(position, orientation)
     noise = np.random.default_rng(number).standard_normal((3, track.time.size))
