@@ -201,6 +201,7 @@ def prepare(
     require_memory(sum(one.sizes["time"] for one in many))
     intervals = intervals_of(study)
     require_size(len(intervals.labels), 2 * spline_of(study).size)
+    wanted = study.fit.angle if angle is None else angle
     tracks, parts, places = [], [], []
     raws: list[Track] = []
     mistakes, dropped, added = 0, list[DroppedFrames](), AddedNoise(0.0, 0.0)
@@ -213,8 +214,10 @@ def prepare(
         # Smoothing is looked for in the track as recorded: gaps would cut its spectrum.
         raws.append(track)
         dropped.append(find_dropped_frames(track, recording["time"].values))
-        track, more = with_least_noise(track, side=study.block.side_m, number=index)
-        added = AddedNoise(*map(max, added, more))
+        # A body with a heading is fitted no better with it where the orientation is not used.
+        if not study.block.body().symmetry or (wanted != "none" and track.turns):
+            track, more = with_least_noise(track, side=study.block.side_m, number=index)
+            added = AddedNoise(*map(max, added, more))
         track = with_gaps(track, dropped[-1])
         cut = cut_track(track, intervals, fewest=LIMIT.fewest_samples, where=where)
         for number, part in enumerate(cut):
@@ -232,7 +235,6 @@ def prepare(
                 "recordings one by one"
             )
     # One use of the angle for all recordings, as they share the noise of the angle.
-    wanted = study.fit.angle if angle is None else angle
     used_angle = use_angle(many, tracks, wanted) if has_heading(study, wanted) else "none"
     series = series_of(parts, study, used_angle, places)
     # A tank that was fitted to the positions touches them: say so before the wall share does.

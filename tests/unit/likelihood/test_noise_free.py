@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
+from driftwalk.likelihood.preparation import AngleUse, prepare
 from driftwalk.likelihood.tracker_errors.noise_free import with_least_noise
 from driftwalk.record import estimate_tracking_noise
 from driftwalk.schema import Track, body_track
@@ -66,6 +67,26 @@ def test_a_column_that_is_only_filled_stays_so() -> None:
 def test_a_seen_track_keeps_an_exact_orientation() -> None:
     track = walk(3e-4, 0.0, seed=1)
     assert with_least_noise(track, side=SIDE, number=0)[0] is track
+
+
+@pytest.mark.parametrize(
+    ("shape", "angle", "gets"),
+    [
+        ("square", "auto", True), ("square", "none", False),
+        ("disc:3cm", "auto", True), ("disc:3cm", "none", True),
+    ],
+)  # fmt: skip
+def test_a_square_whose_orientation_is_not_used_gets_none(
+    shape: str, angle: AngleUse, gets: bool
+) -> None:
+    recording = dw.tank30_recording("without_noise").isel(time=slice(0, 400))
+    study = dw.apply_overrides(dw.Study(), {"block.shape": shape})
+    ready = prepare([recording], study, angle, None)
+    assert (ready.added.position_noise_m > 0.0) is gets
+    filled = recording.assign(theta=0.0 * recording["theta"])
+    assert (prepare([filled], study, angle, None).added.position_noise_m > 0.0) is (
+        shape != "square"
+    )
 
 
 @pytest.mark.slow
