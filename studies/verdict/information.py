@@ -34,6 +34,7 @@ MOST_STD: Final = 0.06
 MOST_LAW_STD: Final = 0.25
 MOST_WALKER_STD: Final = 0.15
 MOST_WALL_SHARE: Final = 0.7
+MOST_WALKER_WALL_SHARE: Final = 0.95
 KNOTS_M: Final = 0.02
 PRIOR_M_S: Final = 0.05
 TILT_M_S: Final = 1e-4

@@ -84,11 +84,10 @@ def make(group: list[World], out: Path) -> list[str]:
         for world in group:
             place, touched = walkers.simulate(world.body, 60.0 * world.minutes, world.seed)
             facts = information.of_walker(world.body, 60.0 * world.minutes)
-            shares = {
-                "wall_share": float(touched.mean()),
-                "visited_share": information.visited(place),
-            }
-            write(out, world, place, None, facts | shares)
+            wall = float(touched.mean())
+            facts["judgeable"] = facts["judgeable"] and wall < information.MOST_WALKER_WALL_SHARE
+            facts |= {"wall_share": wall, "visited_share": information.visited(place)}
+            write(out, world, place, None, facts)
     return [world.name for world in group]
 
 

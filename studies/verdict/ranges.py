@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-SEEDS: Final = {"development": 71_000, "held-out": 72_000}
+SEEDS: Final = {"development": 71_000, "held-out": 72_000, "confirmation": 73_000}
 """Of the two sets: choices may be made on the first alone."""
 
 RADIUS_M: Final = 0.15
@@ -61,7 +61,7 @@ OUTLIER_M: Final = Range(5e-3, 30e-3)
 
 
 class Kind(NamedTuple):
-    """A kind of recording, and how many of it are in the two sets."""
+    """A kind of recording, and how many of it are in the development set and in each other one."""
 
     name: str
     development: int

@@ -38,9 +38,10 @@ def model_verdicts(
 
     `evidence` has the models whose summaries were matched, by their places. To what the recording
     says of a law (`law_findings`) a comparison adds: against a model is another one that is clearly
-    closer or likelier. Its verdict is "cannot tell" where the summaries were not matched, where a
-    walk of recorded steps passes all tests as well, and where another model that explains the
-    recording is as likely and no more complicated.
+    closer or likelier. Its verdict is "cannot tell" where the summaries were not matched, where it
+    is at the end of its range, where a walk of recorded steps passes all tests as well, where
+    another model that explains the recording is as likely and no more complicated, and where a
+    simpler one that does not explain it is as likely.
     """
     behind, error = np.array([one.behind(held_out[0]) for one in held_out]).T
     clearly_behind = behind > VERDICT.tied_sigmas * error
@@ -75,24 +76,42 @@ def model_verdicts(
             against.insert(0, "it repeats recorded steps and knows no arena")
         if asked is None:
             unable.insert(0, _not_matched(motion))
+        if (ended := entry.at_range_end(one.point)) is not None:
+            unable.append(ended)
         if passing:
             unable.append(
                 f"a walk that only repeats recorded steps ({passing[0]}) passes every test as "
                 "well: record for longer, or where the body meets the wall"
             )
         found.append(verdict_of(against, [] if against else unable))
-    _doubt_equals(found, entries, answer.best, answer.as_good(entries, evidence))
+    if answer.best is not None:
+        as_good = answer.as_good(entries, evidence)
+        _doubt_equals(found, entries, answer.best, answer.rivals, as_good)
     return found
 
 
 def _doubt_equals(
-    found: list[Verdict], entries: Sequence[Candidate], best: int | None, as_good: Sequence[int]
+    found: list[Verdict],
+    entries: Sequence[Candidate],
+    best: int,
+    rivals: Sequence[int],
+    as_good: Sequence[int],
 ) -> None:
     """Leave open which of several models explains a recording, where they are equally good."""
-    equal = [k for k in as_good if found[k].explains]
-    if best is None or not equal or not found[best].explains:
+    if not found[best].explains:
+        # One that passes by its further numbers and is no likelier may lack the same.
+        for k in rivals:
+            if found[k].explains:
+                found[k] = found[k].and_also(
+                    [],
+                    [
+                        f"{entries[best].model.name} is simpler and as likely, and does not "
+                        "explain it: the law may be another one; record for longer"
+                    ],
+                )
         return
-    for k in (best, *equal):
+    equal = [k for k in as_good if found[k].explains]
+    for k in (best, *equal) if equal else ():
         others = " and ".join(entries[one].model.name for one in (best, *equal) if one != k)
         found[k] = found[k].and_also(
             [], [f"{others} explains it as well and is as likely: record for longer"]

@@ -29,7 +29,7 @@ def motion(**changes: Any) -> Any:
     usual: dict[str, Any] = {
         "own": np.full(6, 0.1),
         "held": SimpleNamespace(names=NAMES),
-        "recorded_checks": np.ones(8),
+        "recorded_checks": np.where(np.array(CHECKS) == "wall_share", 0.5, 1.0),
         "replicates": 200,
         "clearance": Clearance(0.015, 1e-5),
         "clearance_distance": 0.01,
@@ -71,7 +71,10 @@ def verdicts_of(
     clearance: float = 0.015,
 ) -> list[Verdict]:
     entries = [candidate(name, clearance=clearance) for name in names]
-    held_out = scores or [scored() for _ in names]
+    held_out = [
+        one._replace(point=np.full(len(entry.ranges), 0.5))
+        for one, entry in zip(scores or [scored() for _ in names], entries, strict=True)
+    ]
     answer = rank_by_evidence(entries, evidence)
     return model_verdicts(entries, held_out, recorded or motion(), evidence, answer)
 
@@ -195,6 +198,37 @@ def test_of_models_that_are_as_likely_none_is_rejected_for_its_distance() -> Non
     assert rank_by_evidence(entries, less_likely).as_good(entries, less_likely) == []
     found = verdicts_of(names, less_likely, scores=scores)
     assert [one.word for one in found] == [EXPLAINS] * 2
+
+
+def test_a_model_with_more_numbers_that_is_no_likelier_than_one_that_fails_is_left_open() -> None:
+    """Two bodies that turn off before the wall were explained by two states: it fits more."""
+    evidence = {0: TYPICAL._replace(discrepancy=130.0), 1: TYPICAL._replace(deviance=-405.0)}
+    for word, simpler in (
+        (CANNOT_TELL, evidence[0]),
+        (EXPLAINS, TYPICAL._replace(deviance=-300.0, discrepancy=130.0)),
+    ):
+        simple, found = verdicts_of(["run_rest", "two_state"], evidence | {0: simpler})
+        assert not simple.explains
+        assert found.word == word
+    left_open = verdicts_of(["run_rest", "two_state"], evidence)[1]
+    assert left_open.reasons[0].startswith("run_rest is simpler and as likely")
+
+
+def test_a_body_that_is_always_at_the_wall_tells_no_law() -> None:
+    """An active walker at the wall for 99.4 % of the time was explained by run and rest."""
+    always = motion(recorded_checks=np.where(np.array(CHECKS) == "wall_share", 0.994, 1.0))
+    for held in (0.12, 0.3):
+        (found,) = verdicts_of(
+            ["active"], {0: TYPICAL}, scores=[scored(held=held)], recorded=always
+        )
+        assert found.word == CANNOT_TELL
+        assert found.reasons[0].startswith("the body was at the wall for 99.4% of the time")
+
+
+def test_a_model_at_the_end_of_its_range_is_left_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Candidate, "at_range_end", lambda *_: "at the end of its range: speed")
+    (found,) = verdicts_of(["active"], {0: TYPICAL})
+    assert found == Verdict(CANNOT_TELL, ("at the end of its range: speed",))
 
 
 def test_bouts_of_another_law_are_against_a_model_that_gives_the_summaries() -> None:

@@ -88,6 +88,10 @@ def test_a_sound_fit_explains() -> None:
     [
         ({"measured": 100}, "over 4% of the tank, 4.0 times its own area"),
         ({"wall_share": 0.64}, "64% of the intervals are at the wall"),
+        (
+            {"wall_share": 0.3, "drag_coefficient_relative_std": 0.03},
+            "at the wall for 30% of the time, and C_d is known to 3.0% only",
+        ),
         ({"restricted": False}, "the restricted likelihood has no minimum"),
         (
             {"angle_disagreement_std": 4.0, "drag_coefficient_angle_given": 0.8},
@@ -100,6 +104,14 @@ def test_a_number_without_a_meaning_cannot_tell(facts: dict[str, Any], why: str)
     word, reasons = said(fit_of(**{"measured": 1000, **facts}))
     assert word == "cannot tell"
     assert why in reasons
+
+
+@pytest.mark.parametrize(("share", "std"), [(0.3, 0.024), (0.19, 0.03)])
+def test_contacts_do_not_matter_where_they_are_few_or_c_d_is_known_well(
+    share: float, std: float
+) -> None:
+    fit = fit_of(measured=1000, wall_share=share, drag_coefficient_relative_std=std)
+    assert said(fit) == ("explains", "")
 
 
 def test_a_criterion_without_power_cannot_tell_unless_it_failed() -> None:
