@@ -35,9 +35,6 @@ class MisfitPolicy(NamedTuple):
 
 
 MISFIT: Final = MisfitPolicy()
-MOST_WALL_SHARE: Final = 0.95
-"""Share of the time at the wall beyond which a law away from it cannot be seen. Laws were named
-rightly at up to 0.87 and a wrong one at 0.99 (held-out set of studies/verdict, first round)."""
 
 
 class Misfit(NamedTuple):
@@ -133,7 +130,7 @@ def law_findings(
     # In a flow that changes the model is not steady either.
     unable += [] if is_series(motion.like.flow) else unsteady_motion(motion)
     share = motion.recorded_checks[CHECKS.index("wall_share")]
-    if share > MOST_WALL_SHARE:
+    if share > VERDICT.most_wall_share:
         unable.insert(
             0,
             f"the body was at the wall for {share:.1%} of the time: how it moves away from it was "
