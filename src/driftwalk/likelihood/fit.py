@@ -234,7 +234,7 @@ def fit_motion(
     for recording, track in zip(ready.recordings, ready.tracks, strict=True):
         warnings += jump_warnings(recording, body, track=track)
     warnings += warnings_of(facts, shares, ready.intervals, block=chosen.block)
-    warnings += [*law.unsettled, *contradictions(facts)]
+    warnings += [*law.unsettled, *law.noted, *contradictions(facts)]
     warnings += [modes.unsettled] if modes.unsettled else []
     if shape is not None and shape.significant:
         warnings.append(shape.sentence)

@@ -63,7 +63,7 @@ class Alternatives:
         shape = self.shape_change(mode)
         if shape is not None and shape.significant:
             why = "the shape of the flow changes, which feigns such a law"
-            return {name: f"{_found(mode, name)} was not opened: {why}" for name in names}
+            return {name: f"{number_sentence(mode, name)} was not opened: {why}" for name in names}
         series, usable = self.undisturbed(), usable_intervals(self.search.passes.series)
         share = usable_intervals(series) / max(usable, 1)
         if share > 1.0 - ALTERNATIVE.least_disturbed:
@@ -71,8 +71,8 @@ class Alternatives:
         alone = self.search.of(series).shortened().find(mode.point, mode.weights, held=FROM_ANOTHER)
         return {
             name: (
-                f"{_found(mode, name)} was not opened: {self._without(alone, name, share)}; "
-                "contacts with the wall or mistakes of the tracker feign such a law: record where "
+                f"{number_sentence(mode, name)} was not opened: "
+                f"{self._without(alone, name, share)}; contacts with the wall or mistakes of the tracker feign such a law: record where "
                 "the block stays away from the wall"
             )
             for name in names
@@ -96,7 +96,8 @@ class Alternatives:
         return f"in {left} it is {value:.3g} ± {std:.2g}{LAW_NUMBERS[name][1]}"
 
 
-def _found(mode: Mode, name: str) -> str:
+def number_sentence(mode: Mode, name: str) -> str:
+    """Return a number of the law at a mode in words, with its standard deviation."""
     value, std = mode.value_of(name)
     words, unit = LAW_NUMBERS[name]
     return f"{words} of {value:.3g} ± {std:.2g}{unit}"

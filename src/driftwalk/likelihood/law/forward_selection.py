@@ -99,6 +99,8 @@ class LawResult:
     """Reasons why a number of the law was not opened, or why another law may be right."""
     rivals: tuple[Mode, ...] = ()
     """Modes of the laws that may be right as well."""
+    noted: tuple[str, ...] = ()
+    """Laws among the rivals that leave the verdict alone, in sentences."""
 
 
 def least_effects(side: float) -> dict[str, float]:
@@ -238,6 +240,11 @@ class ForwardSelection:
         if idle >= set(candidates):
             return mode, idle
         return self.without(found, idle) or mode, idle
+
+    def opened(self, mode: Mode, name: str, value: float) -> Mode | None:
+        """Return the mode with a number opened, whatever comes of it; nothing without one."""
+        point = replace(mode.point, opened={**mode.point.opened, name: _within(name, value)})
+        return self._near(point, mode.weights)
 
     def _idle(self, mode: Mode, names: Set[str]) -> set[str]:
         """Return which of some opened numbers are too near the model to stay open."""
