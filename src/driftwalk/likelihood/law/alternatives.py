@@ -72,8 +72,8 @@ class Alternatives:
         return {
             name: (
                 f"{number_sentence(mode, name)} was not opened: "
-                f"{self._without(alone, name, share)}; contacts with the wall or mistakes of the tracker feign such a law: record where "
-                "the block stays away from the wall"
+                f"{self._without(alone, name, share)}; contacts with the wall or mistakes of the "
+                "tracker feign such a law: record where the block stays away from the wall"
             )
             for name in names
             if alone is None or not alone.converged or not self._same(mode, alone, name)
