@@ -48,9 +48,9 @@ class LawPolicy(NamedTuple):
     """Difference of the log evidences that nothing missing has feigned. Pulses of the flow feigned
     10; right laws are ahead by 130 and more where the recording tells them at all."""
     slight_sigmas: float = 4.0
-    """A shape of the drag that is too slight to be opened widens the intervals from this score test
+    """A power of the drag that is too slight to be opened widens the intervals from this score test
     on [standard deviations]: chance exceeds it once in 16,000. A power of 2.12 had 5.4 in ten
-    minutes, and without it C_d was off by twice its half interval."""
+    minutes, and the interval of C_d missed without it."""
     lever_sigmas: float = 1.64
     """A lever of the force counts when it is above the notable one by this many standard
     deviations: 5 % of the recordings whose lever is just notable."""
@@ -108,7 +108,9 @@ class LawSearch:
             )
         found = self._beside(found, "the other law", lambda: self._reconsidered(found, start))
         found = self._beside(found, "other explanations", lambda: self._supported(found))
-        found = self._beside(found, "a slight departure", lambda: self._with_slight_shape(found))
+        found = self._beside(
+            found, "a slight power of the drag", lambda: self._with_slight_power(found)
+        )
         return self._beside(found, "the other law", lambda: self._with_rival(found, start))
 
     def _beside(self, found: LawResult, what: str, search: Callable[[], LawResult]) -> LawResult:
@@ -295,19 +297,17 @@ class LawSearch:
         unsettled = (*found.unsettled, *objections.values())
         return replace(found, mode=closed, unsettled=unsettled, rivals=(*found.rivals, mode))
 
-    def _with_slight_shape(self, found: LawResult) -> LawResult:
-        """Return the law, and as a rival the one whose drag has another shape, but slightly so.
+    def _with_slight_power(self, found: LawResult) -> LawResult:
+        """Return the law, and as a rival the one whose drag has a slightly different power.
 
-        A shape below its least effect stays closed: it may be an error of the filter. It may be
+        A power below its least effect stays closed: it may be an error of the filter. It may be
         real as well, and then C_d is another one: a power of 2.12 made it 7.5 % too large, with an
         interval of 3 %. So the intervals hold what both laws give.
         """
-        tests = found.tests
+        tests, name = found.tests, "drag_power"
         if tests is None or set(DRAG_SHAPES) & set(found.mode.point.opened) or found.unsettled:
             return found
-        seen = {name: abs(tests.sigmas.get(name, 0.0)) for name in DRAG_SHAPES}
-        name = max(seen, key=lambda name: seen[name])
-        if seen[name] <= LAW.slight_sigmas:
+        if abs(tests.sigmas.get(name, 0.0)) <= LAW.slight_sigmas:
             return found
         value = NUMBERS[name].model + tests.of(name)[0]
         mode = self.selection.opened(found.mode, name, value)
