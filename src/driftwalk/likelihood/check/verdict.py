@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from math import isnan
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from driftwalk.core.units import in_percent
 from driftwalk.likelihood.check.criteria import Criterion
 from driftwalk.likelihood.result import visited_shares
 from driftwalk.likelihood.warnings import meaningless_of
@@ -99,7 +100,8 @@ def _too_little_seen(fit: xr.Dataset, *, side_m: float) -> Iterator[str]:
     blocks = share * int(inside.sum()) * (float(fit["cell_size"]) / side_m) ** 2
     if share < INFORMATION.least_visited and blocks < INFORMATION.least_blocks:
         yield (
-            f"the block has been over {share:.0%} of the tank, {blocks:.1f} times its own area: "
+            f"the block has been over {in_percent(share)} of the tank, {blocks:.1f} times its own "
+            "area: "
             "the flow, and with it C_d, is not known from so little; record it on a wider path, "
             "with another setting of the pumps"
         )

@@ -86,8 +86,8 @@ def test_a_sound_fit_explains() -> None:
 @pytest.mark.parametrize(
     ("facts", "why"),
     [
-        ({"measured": 100}, "over 4% of the tank, 4.0 times its own area"),
-        ({"wall_share": 0.64}, "64% of the intervals are at the wall"),
+        ({"measured": 100}, "over 4 % of the tank, 4.0 times its own area"),
+        ({"wall_share": 0.64}, "64 % of the intervals are at the wall"),
         ({"restricted": False}, "the restricted likelihood has no minimum"),
         (
             {"angle_disagreement_std": 4.0, "drag_coefficient_angle_given": 0.8},
