@@ -322,7 +322,7 @@ def _plot_checks(comparison: xr.Dataset, ax: Axes) -> None:
     """Draw facts that were not fitted, over those of the recording."""
     for index, (one, (color, marker)) in enumerate(_first(comparison)):
         plot_check_ratios(one, ax, color=color, marker=marker, shift=0.2 * (index - 1))
-    label_checks(comparison, ax)
+    label_checks(comparison.isel(model=slice(len(LOOKS))), ax)
 
 
 def _first(comparison: xr.Dataset) -> list[tuple[xr.Dataset, tuple[str, str]]]:

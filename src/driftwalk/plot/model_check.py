@@ -339,9 +339,13 @@ def label_checks(found: xr.Dataset, ax: Axes) -> None:
     names = [str(name) for name in found["check"].values]
     ax.axvline(1.0, color=style.INK, lw=0.6)
     logarithmic(ax, "x")
-    # A fact that is 0 in the recording has no ratio and no point.
-    never = ["" if value > 0.0 else " (never)" for value in found["check_recorded"].values]
-    words = [CHECK_LABELS.get(name, name) + more for name, more in zip(names, never, strict=True)]
+    # A fact that is 0 in the recording or in a world has no ratio and no point.
+    known = (found["check_low"] > 0.0) & (found["check_recorded"] > 0.0)
+    shown = known.any([dim for dim in known.dims if dim != "check"]).values
+    words = [
+        CHECK_LABELS.get(name, name) + ("" if point else " (too rare)")
+        for name, point in zip(names, shown, strict=True)
+    ]
     ax.set_yticks(np.arange(len(names)), words)
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.set_xlabel("model / recording")

@@ -121,7 +121,9 @@ def test_a_fit_that_breaks_down_at_the_wall_says_so(monkeypatch: pytest.MonkeyPa
     # In this tank a block of 3 cm touches the wall from most of the places of the recording.
     reach = float(np.hypot(track["x"], track["y"]).max())
     narrow = apply_overrides(coarse_study(), {"tank.diameter_m": 2.0 * reach + 0.002})
-    with pytest.raises(InputError, match=r"\d % of the intervals are at the wall and were left out"):
+    with pytest.raises(
+        InputError, match=r"\d % of the intervals are at the wall and were left out"
+    ):
         dw.fit_motion(track, narrow)
 
 
