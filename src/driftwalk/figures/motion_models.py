@@ -158,25 +158,28 @@ def _plot_profile(calibration: xr.Dataset, index: int, level: float, ax: Axes) -
 
 
 def _plot_answer(one: xr.Dataset, ax: Axes) -> None:
-    """Draw a parameter's interval and estimate, and say where it is not determined."""
+    """Draw a parameter's interval and estimate, and say whether it is determined."""
     for end in one["interval"].values:
         if np.isfinite(end):
             ax.axvline(float(end), color=style.BLUE, lw=0.8, ls="--")
     ax.axvline(float(one["estimate"]), color=style.ORANGE, lw=1.2)
-    if not bool(one["determined"]):
-        ax.set_title(f"not determined\n({_width(one)})", loc="left")
+    # In every panel: rows with and without a title would be unequal.
+    word = "determined" if bool(one["determined"]) else "not determined"
+    ax.set_title(f"{word}\n{_width(one)}", loc="left")
 
 
 def _width(one: xr.Dataset) -> str:
-    """Return how wide the interval of a parameter is that is not determined."""
+    """Return how wide the interval of a parameter is, nothing where there is none."""
     half, value = float(one["half_width"]), float(one["estimate"])
-    if not np.isfinite(half):
-        return "to an end of the range"
+    if np.isnan(half):
+        return ""
+    if np.isinf(half):
+        return "(to an end of the range)"
     if str(one["scale"].values) == "log":
-        return f"± {100.0 * half:.0f} %"
+        return f"(± {100.0 * half:.2g} %)"
     low, high = one["interval"].values
     # Next to 0 a part of the value says nothing.
-    return f"± {50.0 * (high - low) / abs(value):.0f} %" if low * high > 0.0 else "0 is within"
+    return f"(± {50.0 * (high - low) / abs(value):.2g} %)" if low * high > 0.0 else "(0 is within)"
 
 
 def _plot_pair(calibration: xr.Dataset, column: int, row: int, ax: Axes) -> None:

@@ -60,6 +60,7 @@ def test_a_profile_is_least_at_its_middle_and_has_the_interval(found: xr.Dataset
         # Around 0 the half width is over a part of the range.
         ((-0.04, 0.09), 0.22, "(0 is within)"),
         ((0.0, 0.09), np.inf, "(to an end of the range)"),
+        ((np.nan, np.nan), np.nan, ""),
     ],
 )
 def test_a_value_that_is_not_determined_says_how_wide_it_is(
