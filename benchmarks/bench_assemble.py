@@ -163,14 +163,19 @@ def draw_scaling(file: Path, rates: dict[str, list[list[float]]]) -> None:
         ax = figure.add_subplot()
         for (way, found), color in zip(rates.items(), (BLUE, ORANGE), strict=True):
             middle = [statistics.median(values) for values in found]
-            ax.plot(SCALES, middle, "o-", ms=3.0, color=color, label=labels[way])
+            reach = [
+                [m - min(v) for m, v in zip(middle, found, strict=True)],
+                [max(v) - m for m, v in zip(middle, found, strict=True)],
+            ]
+            ax.errorbar(SCALES, middle, reach, fmt="o-", ms=3.0, color=color, label=labels[way])
         ax.set_xscale("log", base=2)
         ax.set_xticks(SCALES, [str(blocks) for blocks in SCALES])
         ax.set_ylim(bottom=0.0)
         ax.set(xlabel="blocks in the tank", ylabel="million block-steps a second")
         ax.spines[["top", "right"]].set_visible(False)
+        ax.set_title("bars: least and most of the rounds", loc="left")
         ax.legend()
-        figure.savefig(file, dpi=120, metadata={"Software": None})
+        figure.savefig(file, dpi=160, metadata={"Software": None})
     print(f"wrote {file}")
 
 

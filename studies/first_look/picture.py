@@ -43,6 +43,7 @@ def draw(fit: Path, four: Path, target: Path) -> None:
     with xr.open_dataset(fit / "flow.nc", engine="h5netcdf") as flow:
         dw.plot.flow(flow, axes[1])
     axes[1].set_title("out: flow, drag and noise")
+    axes[1].set_xlabel("x (cm); hatched: not measured")
     for tank, (left, width) in zip(axes[:2], PLACES_IN, strict=False):
         tank.set_xticks(TICKS_CM)
         tank.set_yticks(TICKS_CM)

@@ -11,10 +11,10 @@ from pathlib import Path
 from model import simulate
 
 import driftwalk as dw
-from driftwalk.plot.parts.style import new_figure, print_style
+from driftwalk.plot.parts.style import DOUBLE_COLUMN_MM, new_figure, print_style
 
 RUNS = 1000
-DPI = 110
+DPI = 130
 
 
 def main(file: str, latching: str = "connector") -> None:
@@ -25,7 +25,7 @@ def main(file: str, latching: str = "connector") -> None:
     )
     labels = ("hidden faces without drag", "with the drag of free faces")
     with print_style():
-        figure = new_figure(width_mm=160.0, height_mm=76.0)
+        figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=76.0)
         dw.plot.outcomes(without, figure.add_subplot(), beside=full, labels=labels)
         figure.savefig(Path(file), dpi=DPI, metadata={"Software": None})
 

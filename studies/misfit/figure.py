@@ -9,6 +9,7 @@ stand as open circles.
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,10 @@ from run import current, read_lines
 
 from driftwalk.plot.parts.style import DOUBLE_COLUMN_MM, new_figure, print_style
 
-LEAST = 1e-3
-"""Smallest error on the axis."""
-WANTED = 0.05
+LEAST = 0.1
+"""Smallest error on the axis [%]; the axis says that smaller ones are there."""
+WANTED = 5.0
+"""Error that a fit should not exceed [%]."""
 
 
 def main() -> None:
@@ -54,19 +56,20 @@ def drawn(after: list[dict[str, Any]], before: list[dict[str, Any]]) -> Figure:
     ax.plot([], [], "o", color="C1", fillstyle="none", label="before, median")
     ax.plot([], [], "o", color="C0", label="now, median")
     ax.plot([], [], ".", color="C0", alpha=0.4, label="now, each world")
-    ax.axvline(WANTED, color="0.6", linewidth=0.8)
+    ax.axvline(WANTED, color="0.6", linewidth=0.8, label=f"{WANTED:g} %")
     ax.set_xscale("log")
-    ax.set_xlim(LEAST, 20.0)
-    ax.set_yticks(place, names)
-    ax.set_xlabel("size of the error of $C_d$, estimate over truth minus one")
-    figure.legend(loc="outside upper center", ncols=3)
+    ax.set_xticks([0.1, 1.0, 10.0, 100.0], ["≤ 0.1", "1", "10", "100"])
+    ax.set_xlim(0.9 * LEAST, 200.0)
+    ax.set_yticks(place, [re.sub(r"\^([\d.]+)", r"$^{\1}$", name) for name in names])
+    ax.set_xlabel("size of the error of $C_d$ (%)")
+    figure.legend(loc="outside upper center", ncols=4)
     return figure
 
 
 def sizes(lines: list[dict[str, Any]], name: str) -> np.ndarray:
-    """Return the sizes of a case's errors of C_d."""
+    """Return the sizes of a case's errors of C_d [%]."""
     found = [one for one in lines if one["case"] == name and "drag_coefficient_error" in one]
-    return np.maximum([abs(one["drag_coefficient_error"]) for one in found], LEAST)
+    return np.maximum([100.0 * abs(one["drag_coefficient_error"]) for one in found], LEAST)
 
 
 if __name__ == "__main__":

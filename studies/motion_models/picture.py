@@ -19,6 +19,7 @@ import driftwalk as dw
 from driftwalk.conditions import Conditions, Neighbours
 from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Tank
+from driftwalk.plot.parts.labels import model_words
 from driftwalk.plot.parts.style import INK, add_colorbar, new_panels, print_style
 from driftwalk.schema import Track
 from driftwalk.simulation.backend import Camera
@@ -104,7 +105,7 @@ def draw(axes: Axes, name: str, number: int) -> LineCollection:
     axes.set(
         xlim=(-16, 16), ylim=(-16, 16), aspect="equal", xticks=(-10, 0, 10), yticks=(-10, 0, 10)
     )
-    axes.set_title(name)
+    axes.set_title(model_words(name))
     return lines
 
 

@@ -19,7 +19,9 @@ import xarray as xr
 from driftwalk.calibration.problem import Problem, prepare_problem, score_settings
 from driftwalk.conditions import recorded_camera
 from driftwalk.model import parse_study
+from driftwalk.plot.parts.labels import ANGLE_LABEL, LENGTH_LABEL
 from driftwalk.plot.parts.style import (
+    DOUBLE_COLUMN_MM,
     INK,
     ORANGE,
     add_colorbar,
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 REPLICATES = 16
 QUANTILES = (0.1, 0.5, 0.9)
-DPI = 120
+DPI = 130
 
 
 class Fit(NamedTuple):
@@ -95,12 +97,12 @@ def draw(fit: Fit, problem: Problem, name: str, file: Path) -> None:
     shares = [_histogram(steps, length, angle) for steps in (fit.recorded, fit.simulated)]
     top = max(float(density_of(share, length, angle).max()) for share in shares)
     with print_style():
-        figure = new_figure(width_mm=150.0, height_mm=62.0)
+        figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=66.0)
         axes: list[Axes] = list(figure.subplots(1, 2, sharex=True, sharey=True))
         for ax, share in zip(axes, shares, strict=True):
             mesh = density_mesh(ax, share, length, angle, top=top)
             _mark(ax, fit, (length[-1], angle[0], angle[-1]))
-            ax.set(xlabel="step length (mm)", ylabel="turning angle (°)")
+            ax.set(xlabel=LENGTH_LABEL, ylabel=ANGLE_LABEL)
             ax.label_outer()
         real, simulated = fit.shares()
         titles = [

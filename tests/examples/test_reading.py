@@ -13,7 +13,7 @@ TEXT = """Text `$ driftwalk no`.
 ```console
 $ driftwalk fit "a b.csv" \\
     -o fit/   # a remark
-drag  0.39   90% interval 0.3881 to 0.3976
+drag  0.39   90 % interval 0.3881 to 0.3976
                     # … and more
 $ driftwalk study new > study.toml
 ```

@@ -13,6 +13,7 @@ from driftwalk.calibration.problem import Axes, Problem
 from driftwalk.comparison import StepDistance
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.core.arrays import Floats
+from driftwalk.core.units import in_percent
 from driftwalk.flow.arena import outline_of
 from driftwalk.schema import Parameter, Track
 from driftwalk.schema.kinds.fit import PARAMETERS
@@ -58,7 +59,8 @@ def wall_warning(track: Track, study: Study) -> str | None:
     if share <= WALL_WARNING.notable_share:
         return None
     return (
-        f"the block may touch the wall in {share:.0%} of the samples, and the study takes the "
+        f"the block may touch the wall in {in_percent(share)} of the samples, and the study takes "
+        "the "
         f"default wall (restitution {tank.wall_restitution:g}, friction {tank.wall_friction:g}): a "
         "wrong friction can move C_d by a third; the likelihood fit estimates both from the "
         "contacts (`estimate_wall`): state them (`tank.wall_restitution`, `tank.wall_friction`)"

@@ -11,6 +11,7 @@ from driftwalk.cli.options.shared_types import Json, Overwrite, Threads, option
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.calibration import calibration_answer
 from driftwalk.schema.answers.fit import fit_json
 from driftwalk.schema.answers.parts import estimates, number_text
@@ -227,7 +228,7 @@ def print_fit(fit: xr.Dataset) -> None:
 def print_check(fitted: Fitted) -> None:
     """Print how far the flow is off, the verdict on the model, and what warns."""
     fit = fit_json(fitted.fit, fitted.check)
-    _print_row("flow past the block", "", f"{fitted.flow_error:.1%} off")
+    _print_row("flow past the block", "", f"{in_percent(fitted.flow_error, decimals=1)} off")
     _print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
     _print_verdict(fit)
     for warning in fit["warnings"]:

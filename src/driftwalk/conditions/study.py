@@ -9,6 +9,7 @@ import numpy as np
 
 from driftwalk.conditions.refuse import prefix_of
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import in_percent
 from driftwalk.flow.arena import outline_of, read_arena
 from driftwalk.record import noise_reach
 from driftwalk.schema import body_track
@@ -100,10 +101,10 @@ def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> Non
     stated = study.observation.position_noise_m
     noise = None if isinstance(stated, str) else stated
     reach = noise_reach(track, noise, size=min(x_max - x_min, y_max - y_min))
-    share = np.mean(beyond > reach)
+    share = float(np.mean(beyond > reach))
     if share > MOST_OUTSIDE:
         raise InputError(
-            f"{share:.0%} of the positions lie outside the tank, a {tank.describe()} "
+            f"{in_percent(share)} of the positions lie outside the tank, a {tank.describe()} "
             f"about the origin, farther than noise takes them ({1e3 * reach:.2g} mm): the "
             f"recording spans x {track.x.min():.3g} to {track.x.max():.3g} m, y "
             f"{track.y.min():.3g} to {track.y.max():.3g} m; "

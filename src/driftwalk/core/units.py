@@ -203,6 +203,17 @@ def _expected(unit: str) -> str:
     return f"a number in {unit} or a quantity{example}"
 
 
+def in_percent(share: float, *, decimals: int = 0, sign: bool = False) -> str:
+    """Return a share as a percentage, with so many decimals, and with "+" if it may be negative.
+
+    Examples
+    --------
+    >>> in_percent(0.9), in_percent(0.0025, decimals=2), in_percent(0.1, sign=True)
+    ('90 %', '0.25 %', '+10 %')
+    """
+    return f"{100.0 * share:{'+' if sign else ''}.{decimals}f} %"
+
+
 def raised_powers(unit: str) -> str:
     """Return a unit as print has it, with its powers raised.
 

@@ -141,7 +141,10 @@ def assembly_sizes_figure(
         panels.pop().remove()
     else:
         plot_survival(times, panels[3])
-    style.letter_panels(panels)
+    # All panels have the same title: of how many runs they are.
+    figure.suptitle(panels[0].get_title(loc="left"))
+    titles = ["at the end", "mean size", "shares", "waiting times"]
+    style.letter_panels(panels, titles[: len(panels)])
     return figure
 
 

@@ -9,14 +9,15 @@ from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.distances import LEGEND_ORDER, plot_ks_map, plot_refined_map
 from driftwalk.plot.flow_field import COMPONENTS, add_speed_bar, plot_flow, top_speed
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.labels import plot_parameters
+from driftwalk.plot.parts.labels import PlotParameter, plot_parameters
 from driftwalk.plot.step_densities import plot_density_panels, plot_steps, shared_setting_text
 from driftwalk.plot.tank import plot_trajectory
-from driftwalk.plot.uncertainty import plot_distance_profile, plot_validation
+from driftwalk.plot.uncertainty import plot_distance_profile, plot_validation, through_optimum
 from driftwalk.schema import body_track
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Length of the sample of the path that is drawn [s].
@@ -70,8 +71,10 @@ def flow_figure(flow: xr.Dataset) -> Figure:
     """Return Fig. 2: the block's velocity next to the water's, or the water's alone."""
     has_block = all(name in flow for name in COMPONENTS["block"])
     if not has_block:
-        ax = style.axes_or_new(None, height_mm=76.0, layout="compressed")
-        return style.figure_of(plot_flow(flow, ax))
+        ax = plot_flow(flow, style.axes_or_new(None, height_mm=78.0, layout="compressed"))
+        if _is_filled(ax):
+            ax.set_title("hatched: filled, not measured", loc="left")
+        return style.figure_of(ax)
     top = max(top_speed(flow, field) for field in COMPONENTS)
     figure, row = style.new_panels(
         1, 2, height_mm=92.0, layout="compressed", sharex=True, sharey=True
@@ -79,11 +82,15 @@ def flow_figure(flow: xr.Dataset) -> Figure:
     plot_flow(flow, row[0], field="block", speed_limit=top, colorbar="none")
     plot_flow(flow, row[1], field="water", speed_limit=top, colorbar="none")
     row[1].set_ylabel("")
-    filled = any(str(patch.get_label()).startswith("filled") for patch in row[1].patches)
-    hatched = " (hatched: filled, not measured)" if filled else ""
+    hatched = " (hatched: filled, not measured)" if _is_filled(row[1]) else ""
     style.letter_panels(row, ["block velocity", f"corrected flow{hatched}"])
     add_speed_bar(row[1].collections[0], row)
     return figure
+
+
+def _is_filled(ax: Axes) -> bool:
+    """Return whether a part of the flow was filled, and so is hatched."""
+    return any(str(patch.get_label()).startswith("filled") for patch in ax.patches)
 
 
 def trajectory_figure(trajectory: xr.Dataset, *, body: str | None = None) -> Figure:
@@ -145,9 +152,9 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
     parameters = plot_parameters(calibration)
     if any(f"bootstrap_{one.name}" not in calibration for one in parameters):
         return _profiles_figure(calibration)
-    figure, row = style.new_panels(1, len(parameters) + 1, height_mm=74.0)
+    figure, row = style.new_panels(1, len(parameters) + 1, height_mm=80.0)
     plot_validation(calibration, row)
-    style.letter_panels(row, [*(f"along {one.symbol}" for one in parameters), "estimates"])
+    style.letter_panels(row, [*(_along(calibration, one) for one in parameters), "estimates"])
     style.legend_above(figure, row[0], 7)
     # What only the last panel shows is named there.
     named = row[0].get_legend_handles_labels()[1]
@@ -160,11 +167,19 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
     return figure
 
 
+def _along(calibration: xr.Dataset, parameter: PlotParameter) -> str:
+    """Return along which line a profile runs: other parameters have their value on the grid."""
+    line = through_optimum(calibration, parameter)
+    others = [one for one in plot_parameters(calibration) if one.name != parameter.name]
+    at = ", ".join(one.words(float(line[one.name])) for one in others)
+    return f"along {parameter.symbol}" + (f"\nat {at}" if at else "")
+
+
 def _profiles_figure(calibration: xr.Dataset) -> Figure:
     parameters = plot_parameters(calibration)
     figure, row = style.new_panels(1, len(parameters), height_mm=68.0)
     for parameter, ax in zip(parameters, row, strict=True):
         plot_distance_profile(calibration, ax, parameter=parameter.name)
-    style.letter_panels(row, [f"along {one.symbol}" for one in parameters])
+    style.letter_panels(row, [_along(calibration, one) for one in parameters])
     style.legend_above(figure, row[0], 7)
     return figure

@@ -13,7 +13,7 @@ import numpy as np
 from driftwalk.core.errors import InputError
 from driftwalk.figures.calibration import trajectory_figure
 from driftwalk.figures.write import Figures, marked_simulated
-from driftwalk.plot.flow_field import plot_flow
+from driftwalk.plot.flow_field import plot_flow, top_speed
 from driftwalk.plot.model_check import (
     plot_innovations,
     plot_predicted_steps,
@@ -120,8 +120,10 @@ def fit_figures(
     --------
     ``write_figures(fit_figures(fit, recording, flows=[flow]), "fit/figures")``
     """
+    # One scale for all flows of a recording whose pumps were switched.
+    top = max((top_speed(one, "water") for one in flows), default=0.0)
     figures: Figures = {
-        "_".join(["flow", *_label(one)]): partial(_flow_figure, one) for one in flows
+        "_".join(["flow", *_label(one)]): partial(_flow_figure, one, top) for one in flows
     }
     figures["trajectory"] = lambda: trajectory_figure(recording, body=body)
     figures = marked_simulated(figures, fit)
@@ -137,11 +139,11 @@ def _label(flow: xr.Dataset) -> list[str]:
     return [str(flow.attrs["flow_label"])] if "flow_label" in flow.attrs else []
 
 
-def _flow_figure(flow: xr.Dataset) -> Figure:
+def _flow_figure(flow: xr.Dataset, top: float) -> Figure:
     figure, row = style.new_panels(
         1, 2, height_mm=80.0, layout="compressed", sharex=True, sharey=True
     )
-    plot_flow(flow, row[0])
+    plot_flow(flow, row[0], speed_limit=top)
     plot_flow_error(flow, row[1])
     row[1].set_ylabel("")
     filled = bool((flow["flag"].values == FLAGS["filled"]).any())
@@ -180,7 +182,7 @@ def laws_figures(fit: xr.Dataset) -> Figures:
 
 
 def _laws_figure(fit: xr.Dataset) -> Figure:
-    figure, (ax,) = style.new_panels(1, 1, width_mm=1.4 * style.SINGLE_COLUMN_MM, height_mm=55.0)
+    figure, (ax,) = style.new_panels(1, 1, height_mm=55.0)
     plot_laws(fit, ax)
     return figure
 
@@ -204,6 +206,8 @@ def plot_laws(fit: xr.Dataset, ax: Axes) -> Axes:
     --------
     ``plot_laws(fit, ax)``
     """
+    from matplotlib.ticker import FixedLocator
+
     every = compared_laws(fit)
     known = [law for law in reversed(every) if law.solved]
     if not known:
@@ -213,25 +217,30 @@ def plot_laws(fit: xr.Dataset, ax: Axes) -> Axes:
     lost, std = (np.array(one) for one in zip(*((law.loss, law.std) for law in known), strict=True))
     place = np.arange(len(names))
     ax.errorbar(lost, place, xerr=std, fmt="o", ms=3.0, lw=0.9, capsize=2.0, color=style.BLUE)
-    # A logarithmic axis is even around 0, up to the largest standard error and 1e-5 nats at least.
-    even = max(float(std.max()), 1e-5)
+    # A logarithmic axis is even around 0, as far as the errors of laws that may be the best reach,
+    # and to 1e-5 nats at least.
+    even = max(float(std[lost <= 2.0 * std].max(initial=0.0)), 1e-5)
     if float(lost.max()) > 20.0 * even:
         # From a power of ten on: no other label of the axis is then next to that of 0.
-        ax.set_xscale("symlog", linthresh=10.0 ** math.ceil(math.log10(even)))
+        first, last = (math.ceil(math.log10(one)) for one in (even, float(lost.max())))
+        ax.set_xscale("symlog", linthresh=10.0**first)
+        minor = np.arange(2, 10) * 10.0 ** np.arange(first - 1, last)[:, None]
+        ax.xaxis.set_minor_locator(FixedLocator(minor.ravel().tolist()))
     else:
         ax.locator_params(axis="x", nbins=5)
     ax.axvline(0.0, color=style.MUTED, lw=0.6)
     ax.set_yticks(place, names)
     ax.set_ylim(-0.6, len(names) - 0.4)
-    ax.set_xlabel("loss per held out sample, against the best law (nats)")
+    ax.set_xlabel("loss per sample, against the best law (nats)")
+    ax.set_title("held out samples; bars: standard error", loc="left")
     unsolved = len(every) - len(known)
     if unsolved:
-        ax.set_title(f"not shown, without a solution: {unsolved}")
+        ax.set_title(f"not shown, without a solution: {unsolved}", loc="right")
     return ax
 
 
 def _stirring_figure(fit: xr.Dataset) -> Figure:
-    figure = style.new_figure(width_mm=1.2 * style.SINGLE_COLUMN_MM, height_mm=62.0)
+    figure = style.new_figure(width_mm=style.SINGLE_COLUMN_MM, height_mm=62.0)
     plot_shared_stirring(fit, figure.add_subplot())
     return figure
 
@@ -260,19 +269,19 @@ def plot_shared_stirring(fit: xr.Dataset, ax: Axes) -> Axes:
     confidence = percent(fit["confidence"])
     ax.errorbar(
         distance, value, yerr=np.abs(ends - value), fmt="o", ms=3.0, lw=0.9, capsize=2.0,
-        color=style.BLUE, label=f"at each distance ({confidence})",
+        color=style.BLUE, label=f"at each distance (bars: {confidence})",
     )  # fmt: skip
     r = np.linspace(0.0, 1.05 * float(distance.max()), 200)
-    low, length, high = (
-        np.exp(-0.5 * (0.01 * r / max(one, 1e-9)) ** 2) for one in shared_lengths(fit)
-    )
-    ax.fill_between(r, low, high, color=style.PALE, lw=0.0, label=f"its {confidence} interval")
-    ax.plot(r, length, color=style.INK, label="exp(−r²/2L²)")
+    lengths = shared_lengths(fit)
+    low, middle, high = (np.exp(-0.5 * (0.01 * r / max(one, 1e-9)) ** 2) for one in lengths)
+    ax.fill_between(r, low, high, color=style.PALE, lw=0.0)
+    law = rf"$\exp(-r^2/2L^2)$, $L$ = {1e3 * lengths[1]:.3g} mm"
+    ax.plot(r, middle, color=style.INK, label=f"{law} (band: {confidence})")
     ax.axhline(0.0, color=style.MUTED, lw=0.6)
     ax.set_xlim(0.0, float(r[-1]))
-    ax.set_xlabel("distance of the bodies r (cm)")
+    ax.set_xlabel("distance of the bodies $r$ (cm)")
     ax.set_ylabel("correlation of the forces")
-    ax.legend()
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
     return ax
 
 

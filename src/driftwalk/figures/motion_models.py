@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 LOOKS: Final = ((style.BLUE, "o"), (style.ORANGE, "s"), ("#009E73", "^"))
 """Colours and markers of the first models of a comparison, whose facts are drawn."""
+NOT_FITTED: Final = "not fitted (bars: 20 simulations)"
 
 
 def model_calibration_figures(model_calibration: xr.Dataset) -> Figures:
@@ -89,7 +90,7 @@ def pairs_figure(calibration: xr.Dataset) -> Figure:
     counts = calibration.attrs["estimate_from"] == "summaries"
     figure.suptitle(
         f"{model_words(calibration.attrs['model'])}: values that could have given the recording "
-        "(orange: estimate)"
+        "(orange: estimate, dashed: interval)"
         + ("" if counts else "; they do not count, the estimate is the search's")
     )
     return figure
@@ -114,7 +115,7 @@ def profiles_figure(calibration: xr.Dataset) -> Figure:
         ax.set_ylabel("rise of the misfit")
     figure.suptitle(
         f"{model_words(calibration.attrs['model'])}: misfit along each parameter, the others at "
-        f"their best (grey: {percent(confidence)} level; dashed: interval)"
+        f"their best (orange: estimate, dashed: interval, grey: {percent(confidence)} level)"
     )
     return figure
 
@@ -129,7 +130,7 @@ def quality_figure(calibration: xr.Dataset) -> Figure:
     plot_own_aspects(calibration, aspects, label="the recording's own parts")
     plot_check_ratios(calibration, checks, color=style.BLUE)
     label_checks(calibration, checks)
-    style.letter_panels(row, ["distance from blocks not seen", "not fitted, 20 worlds"])
+    style.letter_panels(row, ["distance from blocks not seen", NOT_FITTED])
     style.legend_above(figure, aspects, 2)
     return figure
 
@@ -137,7 +138,8 @@ def quality_figure(calibration: xr.Dataset) -> Figure:
 def _plot_one(calibration: xr.Dataset, index: int, ax: Axes) -> None:
     """Draw the histogram of a parameter's draws, its interval and its estimate."""
     one = calibration.isel(parameter=index)
-    ax.hist(one["draws"].values, bins=24, color=style.MUTED)
+    look: dict[str, Any] = {"color": style.PALE, "ec": style.MUTED, "lw": 0.8}
+    ax.hist(one["draws"].values, bins=24, histtype="stepfilled", **look)
     _plot_answer(one, ax)
     ax.set_yticks([])
     ax.xaxis.set_major_locator(_few_ticks())
@@ -156,13 +158,28 @@ def _plot_profile(calibration: xr.Dataset, index: int, level: float, ax: Axes) -
 
 
 def _plot_answer(one: xr.Dataset, ax: Axes) -> None:
-    """Draw a parameter's interval and estimate, and say where it is not determined."""
+    """Draw a parameter's interval and estimate, and say whether it is determined."""
     for end in one["interval"].values:
         if np.isfinite(end):
             ax.axvline(float(end), color=style.BLUE, lw=0.8, ls="--")
     ax.axvline(float(one["estimate"]), color=style.ORANGE, lw=1.2)
-    if not bool(one["determined"]):
-        ax.set_title(f"not determined\n(± {100.0 * float(one['half_width']):.0f} %)", loc="left")
+    # In every panel: rows with and without a title would be unequal.
+    word = "determined" if bool(one["determined"]) else "not determined"
+    ax.set_title(f"{word}\n{_width(one)}", loc="left")
+
+
+def _width(one: xr.Dataset) -> str:
+    """Return how wide the interval of a parameter is, nothing where there is none."""
+    half, value = float(one["half_width"]), float(one["estimate"])
+    if np.isnan(half):
+        return ""
+    if np.isinf(half):
+        return "(to an end of the range)"
+    if str(one["scale"].values) == "log":
+        return f"(± {100.0 * half:.2g} %)"
+    low, high = one["interval"].values
+    # Next to 0 a part of the value says nothing.
+    return f"(± {50.0 * (high - low) / abs(value):.2g} %)" if low * high > 0.0 else "(0 is within)"
 
 
 def _plot_pair(calibration: xr.Dataset, column: int, row: int, ax: Axes) -> None:
@@ -223,7 +240,7 @@ def _figure(comparison: xr.Dataset) -> Figure:
     parts: dict[str, tuple[Any, Callable[..., object]]] = {
         "held-out blocks": (grid[0, :], plot_models),
         "the same by aspect": (grid[1, 0], _plot_aspects),
-        "not fitted, 20 worlds": (grid[1, 1], _plot_checks),
+        NOT_FITTED: (grid[1, 1], _plot_checks),
     }
     panels = [figure.add_subplot(place) for place, _ in parts.values()]
     for ax, (_, draw) in zip(panels, parts.values(), strict=True):
@@ -263,7 +280,8 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax = style.axes_or_new(ax)
     shown = comparison.isel(model=slice(None, None, -1))
     place = np.arange(shown.sizes["model"])
-    for baseline, color, marker in ((False, style.BLUE, "o"), (True, style.MUTED, "D")):
+    # The colours of LOOKS belong to single models.
+    for baseline, color, marker in ((False, style.INK, "o"), (True, style.MUTED, "D")):
         of = shown["baseline"].values.astype(bool) == baseline
         if of.any():
             ax.errorbar(
@@ -297,9 +315,9 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
 def _plot_aspects(comparison: xr.Dataset, ax: Axes) -> None:
     """Draw the distances of the first models in each aspect, and the recording's own."""
     place = np.arange(comparison.sizes["aspect"])
-    for one, (color, marker) in _first(comparison):
+    for index, (one, (color, marker)) in enumerate(_first(comparison)):
         held, name = one["held_out_distance"].values, model_words(str(one["model"].values))
-        ax.plot(held, place, marker, ms=3.5, color=color, label=name)
+        ax.plot(held, place + 0.2 * (index - 1), marker, ms=3.5, color=color, label=name)
     plot_own_aspects(comparison, ax, label="the recording's own parts")
 
 
@@ -307,7 +325,7 @@ def _plot_checks(comparison: xr.Dataset, ax: Axes) -> None:
     """Draw facts that were not fitted, over those of the recording."""
     for index, (one, (color, marker)) in enumerate(_first(comparison)):
         plot_check_ratios(one, ax, color=color, marker=marker, shift=0.2 * (index - 1))
-    label_checks(comparison, ax)
+    label_checks(comparison.isel(model=slice(len(LOOKS))), ax)
 
 
 def _first(comparison: xr.Dataset) -> list[tuple[xr.Dataset, tuple[str, str]]]:

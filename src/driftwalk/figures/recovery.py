@@ -12,6 +12,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.figures.write import Figures
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import percent
+from driftwalk.plot.parts.labels import logarithmic
 from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
@@ -149,26 +150,34 @@ def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     for color, angle in zip(COLORS, recovery["angle"].values, strict=False):
         part = recovery.sel(angle=angle)
         used = part["used"].values == 1
+        of = f"{angle}: " if recovery.sizes["angle"] > 1 else ""
         stated = np.where(used, part["drag_coefficient_sd"].values, np.nan)
         known = used.any(axis=1)
         rms = part["rms_error"].sel(parameter="drag_coefficient").values
-        ax.plot(minutes, 100.0 * rms, "o", ms=3.5, color=color, label=f"{angle}: measured")
+        ax.plot(minutes, 100.0 * rms, "o", ms=3.5, color=color, label=f"{of}measured")
         ax.plot(
             minutes[known], 100.0 * np.nanmedian(stated[known], axis=1), "x", ms=4.0, color=color,
-            label=f"{angle}: stated by the fit",
+            label=f"{of}stated by the fit",
         )  # fmt: skip
         low, middle, high = (
             float(part[f"drag_coefficient_error_scale{end}"]) for end in ("_low", "", "_high")
         )
         root = np.sqrt(60.0 * drawn)
-        ax.plot(drawn, 100.0 * middle / root, color=color, lw=0.9)
-        ax.fill_between(drawn, 100.0 * low / root, 100.0 * high / root, color=color, alpha=0.15)
+        band = percent(recovery.attrs["needed_confidence"])
+        ax.plot(
+            drawn, 100.0 * middle / root, color=color, lw=0.9,
+            label=f"{of}law $T^{{-1/2}}$ (band: {band})",
+        )  # fmt: skip
+        ax.fill_between(
+            drawn, 100.0 * low / root, 100.0 * high / root, color=color, alpha=0.15, lw=0.0
+        )
     asked = float(recovery.attrs["drag_coefficient_precision"])
     if np.isfinite(asked):
         ax.axhline(100.0 * asked, color=style.MUTED, lw=0.7, dashes=(3, 3), label="wanted")
     if np.isfinite(recovery["drag_coefficient_error_scale"].values).any():
         # Without a point a logarithmic axis has no range.
-        _logarithmic(ax)
+        logarithmic(ax, "x")
+        logarithmic(ax, "y")
     ax.set(xlabel="length of a recording (min)", ylabel="error of $C_d$, rms (%)")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return ax
@@ -228,7 +237,8 @@ def _groups(recovery: xr.Dataset) -> Iterator[tuple[Floats, dict[str, Any], xr.D
             shift = 0.5 * ((index + 0.5) / len(angles) - 0.5)
             at = number * (count + BETWEEN_GROUPS) + np.arange(count) + shift
             # The legend has one entry for all lengths.
-            name = f"angle {angle}" if number == 0 else "_"
+            name = f"angle {angle}" if len(angles) > 1 else "estimate"
+            name = name if number == 0 else "_"
             color = COLORS[index % len(COLORS)]
             used = part["used"].values == 1
             for kept, face, label in ((used, color, name), (~used, "white", None)):
@@ -250,17 +260,6 @@ def _label_groups(ax: Axes, recovery: xr.Dataset) -> None:
 
 def _length(seconds: float) -> str:
     return f"{seconds / 60.0:g} min" if seconds >= 60.0 else f"{seconds:g} s"
-
-
-def _logarithmic(ax: Axes) -> None:
-    """Set both axes to logarithms with plain numbers."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    ax.set(xscale="log", yscale="log")
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter(NullFormatter())
 
 
 def plot_model_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:

@@ -17,6 +17,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError, argument_text
+from driftwalk.core.units import in_percent
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.check.power import POWER, detectable_sigmas
 from driftwalk.likelihood.filter.parameters import Amplitudes
@@ -94,7 +95,7 @@ class MeasuredFlow:
         said = f"{self.source}: {self.count} vectors, errors of {1e3 * size:.2g} mm/s {self.errors}"
         if self.amplitudes is not None:
             speed = np.sqrt(np.nanmean(self.velocity.reshape(self.layers, -1) ** 2, axis=1))
-            shares = ", ".join(f"{one:.0%}" for one in speed[1:] / speed[0])
+            shares = ", ".join(in_percent(one) for one in speed[1:] / speed[0])
             said += f"; it changes in time, in modes of {shares} of the mean"
         return f"{said}; {known}"
 
@@ -439,8 +440,10 @@ def agreement_tests(facts: Mapping[str, Any]) -> list[Agreement]:
             Agreement(
                 "measured scale",
                 facts["measured_flow_scale_p_value"],
-                f"the measured flow is {abs(off):.0%} too {'fast' if off > 0.0 else 'slow'} for "
-                f"the motion (± {facts['measured_flow_scale_std']:.1%}): are its length scale and "
+                f"the measured flow is {in_percent(abs(off))} too "
+                f"{'fast' if off > 0.0 else 'slow'} for "
+                f"the motion (± {in_percent(facts['measured_flow_scale_std'], decimals=1)}): are "
+                "its length scale and "
                 "frame interval right?",
                 facts["measured_flow_scale_detectable"],
             )

@@ -15,6 +15,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import in_percent
 from driftwalk.likelihood.filter.parameters import Amplitudes
 from driftwalk.likelihood.fitted_modes import FRAMES, stored_amplitudes
 from driftwalk.schema import FLAGS, build_flow_field
@@ -167,7 +168,8 @@ def _principal(off: Floats, mean: Floats) -> Floats:
     if len(shares) > SERIES.most_modes and shares[SERIES.most_modes] > SERIES.most_left:
         raise InputError(
             f"the measured flow changes in time in {len(shares)} modes, and the fit takes "
-            f"{SERIES.most_modes}: the next one is {shares[SERIES.most_modes]:.0%} of the flow; "
+            f"{SERIES.most_modes}: the next one is {in_percent(shares[SERIES.most_modes])} of the "
+            "flow; "
             "fit a part of the time in which it changes less"
         )
     largest = vectors[:, ::-1][:, : min(len(shares), SERIES.most_modes)]

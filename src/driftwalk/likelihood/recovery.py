@@ -21,6 +21,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.random_streams import RecoveryStream
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.units import in_percent
 from driftwalk.flow import random_tank_flow
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.fit import fit_motion
@@ -72,7 +73,8 @@ def require_length(study: Study) -> None:
     if expected < LIMIT.fewest_samples:
         raise InputError(
             f"[recover] durations_s: {shortest:g} s at a sample every "
-            f"{settings.sample_interval_s:g} s, {settings.missing_share:.0%} of them missing, are "
+            f"{settings.sample_interval_s:g} s, {in_percent(settings.missing_share)} of them "
+            "missing, are "
             f"about {samples * retained:.0f} positions; the fit needs {LIMIT.fewest_samples} at "
             "least, and some minutes to be of use"
         )

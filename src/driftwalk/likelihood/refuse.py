@@ -13,6 +13,7 @@ from driftwalk.conditions import is_stated
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import machine_memory
+from driftwalk.core.units import in_percent
 from driftwalk.likelihood.filter.series import FILTER, Series, usable_intervals
 
 if TYPE_CHECKING:
@@ -282,7 +283,8 @@ def reason_of_no_solution(wall_share: float, tracks: Sequence[Track], study: Stu
         )
     if wall_share > LIMIT.most_wall_share:
         return (
-            f"{wall_share:.0%} of the intervals are at the wall and were left out, and the motion "
+            f"{in_percent(wall_share)} of the intervals are at the wall and were left out, and the "
+            "motion "
             "in the others does not follow the model; record where the body stays away from the "
             "wall, or check the tank, the side of the block and the units"
         )

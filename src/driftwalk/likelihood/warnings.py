@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from driftwalk.core.units import in_percent
 from driftwalk.likelihood.flow_intervals import Intervals
 from driftwalk.likelihood.law.search import LAW
 from driftwalk.likelihood.refuse import LENGTH, LIMIT, in_words, needed_duration
@@ -92,7 +93,7 @@ def meaningless_of(
 def _on_the_wall(facts: Mapping[str, Any], most: float) -> Iterator[str]:
     if facts["wall_share"] > most:
         yield (
-            f"{facts['wall_share']:.0%} of the intervals are at the wall and were "
+            f"{in_percent(facts['wall_share'])} of the intervals are at the wall and were "
             "left out: C_d comes from the others alone; record where the block stays away from "
             "the wall"
         )
@@ -187,7 +188,8 @@ def _on_the_data(
         if share < WARNING.least_visited:
             name = "" if intervals.steady else f"in {intervals.describe_flow(flow)} "
             yield (
-                f"{name}the block has been over {share:.0%} of the tank only: elsewhere the flow "
+                f"{name}the block has been over {in_percent(share)} of the tank only: elsewhere "
+                "the flow "
                 "is continued smoothly and not measured (flag filled)"
             )
 

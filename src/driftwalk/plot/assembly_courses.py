@@ -145,19 +145,25 @@ def plot_attraction(attraction: xr.Dataset, ax: Axes | None = None) -> Axes:
     check_kind(attraction, "attraction", "gap", "force", "simulated_force")
     ax = style.axes_or_new(ax, height_mm=65.0)
     gap = 1e3 * np.asarray(attraction["gap"].values, dtype=np.float64)
+    lowest = np.inf
     for name, text, color, dashes in (
         ("force", "as stated", style.BLUE, "-"),
         ("simulated_force", "in the simulation", style.ORANGE, (0, (5, 2))),
     ):
         force = 1e3 * np.asarray(attraction[name].values, dtype=np.float64)
         ax.plot(gap, np.where(force > 0.0, force, np.nan), color=color, ls=dashes, label=text)
+        if name == "force":
+            lowest = force[force > 0.0].min(initial=lowest)
     ax.set(
         xlabel="gap between the faces (mm)", ylabel="attraction (mN)", yscale="log",
         xlim=(0.0, gap[-1]),
     )  # fmt: skip
+    if np.isfinite(lowest):
+        # That of the simulation goes to 0 at the end of its reach.
+        ax.set_ylim(bottom=0.5 * lowest)
     ax.spines[["top", "right"]].set_visible(False)
     ax.legend(frameon=False)
-    ax.set_title(fill(str(attraction.attrs["between"]), 42), loc="left")
+    ax.set_title(fill(str(attraction.attrs["between"]), 56), loc="left")
     return ax
 
 
@@ -417,7 +423,8 @@ def plot_growth(
     if what == "shares":
         ax.set_ylim(0.0, 1.02)
     ax.set_xlabel(TIME_LABEL)
-    ax.set_ylabel("blocks per assembly, mean" if what == "mean size" else "share of the blocks")
+    share = "share of the blocks" + (f", {COMPACT}" if COMPACT in curves else "")
+    ax.set_ylabel("blocks per assembly, mean" if what == "mean size" else share)
     _finish(ax, both)
     return ax
 

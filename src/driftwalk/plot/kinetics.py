@@ -9,7 +9,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.plot.assembly_courses import TIME_LABEL, label_right
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind, class_colors, class_names
+from driftwalk.plot.parts.assembly_labels import check_kind, class_colors, class_names, percent
 from driftwalk.plot.parts.polyomino_sketch import (
     are_discs,
     class_cells,
@@ -252,5 +252,6 @@ def plot_predicted_shares(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.spines[["top", "right"]].set_visible(False)
     both = [f"{marker} {one}" for marker, one in zip("●×", kinetics["source"].values, strict=False)]
     points = " and ".join(both) if len(both) > 1 else "points"
-    ax.set_title(f"predicted (lines), seen ({points})", loc="left")
+    bands = percent(kinetics.attrs["confidence"])
+    ax.set_title(f"predicted (lines, bands: {bands}), seen ({points})", loc="left")
     return ax

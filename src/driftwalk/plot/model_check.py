@@ -11,7 +11,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
 from driftwalk.plot.parts.assembly_labels import percent
-from driftwalk.plot.parts.labels import ANGLE_LABEL, LENGTH_LABEL, in_unit, ratio_axis
+from driftwalk.plot.parts.labels import ANGLE_LABEL, LENGTH_LABEL, in_unit, logarithmic
 from driftwalk.schema.answers.fit import residuals_of
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_LABELS
 from driftwalk.schema.check import require_kind
@@ -60,14 +60,12 @@ def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
     lag = check["lag"].values
     expected = check["autocorrelation_expected"].values.mean(axis=0)
     reach = BAND_STDS * check["autocorrelation_std"].values.mean(axis=0)
-    ax.fill_between(
-        lag,
-        expected - reach,
-        expected + reach,
-        color=style.PALE,
-        lw=0,
+    # A step for each lag: points of several components lie on both sides of it.
+    edges = np.append(lag - 0.5, lag[-1] + 0.5)
+    ax.stairs(
+        expected + reach, edges, baseline=expected - reach, fill=True, color=style.PALE, lw=0,
         label="95 % if the model is right",
-    )
+    )  # fmt: skip
     ax.axhline(0.0, color=style.MUTED, lw=0.6)
     names = [str(name) for name in check["component"].values]
     aside = np.linspace(-0.15, 0.15, len(names)) if len(names) > 1 else np.zeros(1)
@@ -83,7 +81,9 @@ def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
         )
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set(xlabel="lag (samples)", ylabel="autocorrelation")
-    ax.margins(x=0.03)
+    ax.set_xlim(edges[0], edges[-1])
+    # Room below the lowest step.
+    ax.use_sticky_edges = False
     return ax
 
 
@@ -174,7 +174,7 @@ def plot_residual_time(
         ax.axvline(edge, color=style.MUTED, lw=0.6, ls=":")
     ax.set_xlabel("time (min)")
     ax.set_ylabel(
-        "strength of the flow, off its mean (%)" if show == "flow" else "squared errors, off (%)"
+        ("strength of the flow" if show == "flow" else "squared errors") + ", off the mean (%)"
     )
     return ax
 
@@ -338,7 +338,14 @@ def label_checks(found: xr.Dataset, ax: Axes) -> None:
     """Name the facts, and draw the line on which model and recording agree."""
     names = [str(name) for name in found["check"].values]
     ax.axvline(1.0, color=style.INK, lw=0.6)
-    ratio_axis(ax)
-    ax.set_yticks(np.arange(len(names)), [CHECK_LABELS.get(name, name) for name in names])
+    logarithmic(ax, "x")
+    # A fact that is 0 in the recording or in a world has no ratio and no point.
+    known = (found["check_low"] > 0.0) & (found["check_recorded"] > 0.0)
+    shown = known.any([dim for dim in known.dims if dim != "check"]).values
+    words = [
+        CHECK_LABELS.get(name, name) + ("" if point else " (too rare)")
+        for name, point in zip(names, shown, strict=True)
+    ]
+    ax.set_yticks(np.arange(len(names)), words)
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.set_xlabel("model / recording")

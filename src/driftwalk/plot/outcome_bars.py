@@ -19,13 +19,15 @@ from driftwalk.plot.parts.assembly_labels import (
     runs_text,
     with_rest,
 )
-from driftwalk.plot.parts.polyomino_sketch import draw_sketches_below
+from driftwalk.plot.parts.polyomino_sketch import draw_sketches_below, names_fit
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
 BAR_WIDTH = 0.76
+# Width of axes in one column of a page.
+COLUMN_PT = 210.0
 
 
 class Bars(NamedTuple):
@@ -55,8 +57,8 @@ def plot_outcomes(
     distribution : xarray.Dataset
         An `outcome_distribution`.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure when left out, two columns wide for two distributions or more
-        than 12 classes.
+        Where to draw; a new figure when left out, two columns wide for two distributions, more
+        than 12 classes, or long names.
     beside : xarray.Dataset, optional
         A second `outcome_distribution`, drawn next to the first. Classes are matched by name.
     labels : tuple of str
@@ -94,8 +96,9 @@ def plot_outcomes(
     drawn = [names[index] for index in shown]
     if len(shown) < len(names):
         drawn.append(OTHER)
-    # Twelve classes have room in one column of a page.
-    ax = _new_axes(wide=len(both) > 1 or len(drawn) > 12) if ax is None else ax
+    # Twelve classes have room in one column of a page, if their names do.
+    wide = len(both) > 1 or len(drawn) > 12 or not names_fit(drawn, COLUMN_PT)
+    ax = _new_axes(wide=wide) if ax is None else ax
     place = np.arange(len(drawn), dtype=np.float64)
     width = BAR_WIDTH / len(both)
     for index, (dataset, color) in enumerate(zip(both, (style.BLUE, style.ORANGE), strict=False)):
@@ -108,10 +111,11 @@ def plot_outcomes(
         at = place - (len(both) - 1) / 2.0 * width
         _draw_realisations(ax, at + 0.22 * width, realisations, names, shown)
     ax.set(xlim=(-0.6, len(drawn) - 0.4), ylim=(0.0, None))
-    rest = f" (other: {len(names) - len(shown)} rarer classes)" if OTHER in drawn else ""
     ax.set_ylabel("share of runs")
     ax.spines[["top", "right"]].set_visible(False)
-    _divide(ax, drawn)
+    notes = ["right of the line: several assemblies"] if _divide(ax, drawn) else []
+    notes += [f"other: {len(names) - len(shown)} rarer classes"] if OTHER in drawn else []
+    rest = f" ({'; '.join(notes)})" if notes else ""
     _legend(ax, both)
     style.settle_layout(ax)
     ax.set_xlabel(f"outcome class{rest}", labelpad=draw_sketches_below(ax, list(place), drawn))
@@ -179,11 +183,13 @@ def _draw_realisations(
     )  # fmt: skip
 
 
-def _divide(ax: Axes, drawn: list[str]) -> None:
-    """Draw a line between the classes of one assembly and those of several."""
+def _divide(ax: Axes, drawn: list[str]) -> bool:
+    """Draw a line between the classes of one assembly and those of several, where both are."""
     complete = [is_complete(name) for name in drawn]
-    if any(complete) and not all(complete[: drawn.index(OTHER) if OTHER in drawn else None]):
+    both = any(complete) and not all(complete[: drawn.index(OTHER) if OTHER in drawn else None])
+    if both:
         ax.axvline(complete.index(False) - 0.5, color=style.MUTED, lw=0.6, dashes=(3, 3), zorder=0)
+    return both
 
 
 def _legend_text(dataset: xr.Dataset, label: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind
+from driftwalk.plot.parts.assembly_labels import check_kind, percent
 from driftwalk.plot.parts.labels import number_label, set_symbols
 from driftwalk.schema.answers.outcome_posterior import condition, number_of
 from driftwalk.schema.answers.parts import each
@@ -65,14 +65,20 @@ def plot_outcome_posterior(
     levels = [_level(mass, share) for share in (confidence, 0.5)]
     if 0.0 < levels[0] < levels[1] < mass.max():
         colours = "Greys" if condition(posterior) else style.speed_colormap()
+        # As far as the range reaches: bins end half a bin beyond their middle.
+        mass = np.pad(mass, 1, mode="edge")
+        middle = [np.r_[edge[0], at, edge[-1]] for edge, at in zip(edges, middle, strict=True)]
         ax.contourf(*middle, mass.T, [*levels, mass.max()], cmap=colours, alpha=0.7)
         ax.contour(*middle, mass.T, levels, colors=style.MUTED, linewidths=0.7)
     nodes = [n.factor * one["node_value"].values for n, one in zip(numbers, chosen, strict=True)]
     ax.plot(*nodes, ".", ms=1.5, color=style.MUTED)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     ax.set(xlabel=number_label(numbers[0]), ylabel=number_label(numbers[1]))
-    used = f"{posterior.attrs['used']}: {100 * confidence:.0f} % and 50 % regions"
-    words = [condition(posterior).replace(" (", "\n("), used, "dots: simulated settings"]
+    regions = f"{percent(confidence)} and 50 % regions"
+    # A posterior that the outcomes refuse is from none.
+    if posterior.attrs["used"] != "none":
+        regions = f"{posterior.attrs['used']}: {regions}"
+    words = [condition(posterior).replace(" (", "\n("), regions, "dots: simulated settings"]
     ax.set_title("\n".join(filter(None, words)), loc="left")
     return ax
 

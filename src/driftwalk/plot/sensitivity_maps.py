@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 # Bright is close to the reference, as bright is a good score in the map of the calibration.
 DISTANCE_COLORMAP: Final = "viridis_r"
 DISTANCE_LABEL: Final = r"$\ell_1$ distance to the reference"
+SHARE_LABEL: Final = "share of runs"
 FLOOR_LABEL: Final = "95 % noise floor"
 REFERENCE_LABEL: Final = "reference"
 KEY_ROW_MM: Final = 11.0
@@ -58,7 +59,8 @@ def plot_l1_map(
 
     Two axes of numbers give a map: the star is the reference, the black line the distance that 95
     in 100 repetitions of the reference itself stay below (95 % noise floor), and hatched cells have
-    no distance. One axis, or one of words, gives points over a band below the noise floor.
+    no distance. One axis, or one of words, gives points over a band below the noise floor; words
+    have a row each. A cross is a setting without a distance.
 
     Parameters
     ----------
@@ -88,11 +90,12 @@ def plot_l1_map(
     distance = _values(sensitivity["l1_distance"], sweep)
     if len(sweep) == 1 or any(axis.words for axis in sweep):
         ax = style.axes_or_new(ax, height_mm=65.0)
-        _draw_floor_band(ax, sensitivity)
-        _draw_lines(ax, sweep, distance, color=style.INK)
+        _draw_floor_band(ax, sensitivity, sweep)
+        _draw_lines(ax, sweep, distance, color=style.BLUE)
+        _mark_missing(ax, sweep, distance)
         _mark_on_line(ax, sensitivity, sweep)
-        ax.set(ylabel=DISTANCE_LABEL, ylim=(0.0, None))
-        _legend_above(ax)
+        _scale_values(ax, sweep, label=DISTANCE_LABEL)
+        style.legend_on_axes(ax)
         return ax
     ax = style.axes_or_new(ax)
     mesh = _draw_map(ax, sweep, distance, colormap=DISTANCE_COLORMAP)
@@ -106,7 +109,7 @@ def plot_l1_map(
             bar.ax.axhline(floor, color=style.INK, lw=1.4)
             if not drawn:
                 bar.set_label(rf"$\ell_1$ distance (line: {FLOOR_LABEL})")
-    _legend_above(ax)
+    style.legend_on_axes(ax)
     return ax
 
 
@@ -119,7 +122,8 @@ def plot_class_panels(
 ) -> list[Axes]:
     """Draw the share of runs in every outcome class over the axes of a sensitivity study.
 
-    One panel per class, all with one scale. Two axes of numbers give maps, other axes points.
+    One panel per class, all with one scale. Two axes of numbers give maps, other axes points; words
+    have a row each.
 
     Parameters
     ----------
@@ -155,9 +159,12 @@ def plot_class_panels(
     if unknown or not shown:
         raise InputError(f"the study has no class {', '.join(unknown) or '(none was asked for)'}")
     columns = min(columns, len(shown))
+    words = _along(sweep).words
+    # A word has 6 mm, a panel of numbers 32 mm; 8 mm are for the title of a panel.
+    row_mm = 8.0 + (6.0 * (len(words) + 1) if words else 32.0)
     panels = style.axes_grid_or_new(
-        axes, count=len(shown), columns=columns, height_mm=20.0 + 40.0 * -(-len(shown) // columns),
-        sharex=True, sharey=True,
+        axes, count=len(shown), columns=columns,
+        height_mm=20.0 + row_mm * -(-len(shown) // columns), sharex=True, sharey=True,
     )  # fmt: skip
     mapped = len(sweep) == 2 and not any(axis.words for axis in sweep)
     row = {name: index for index, name in enumerate(class_names(sensitivity))}
@@ -171,8 +178,7 @@ def plot_class_panels(
         else:
             _draw_lines(ax, sweep, proportion, color=style.BLUE)
             _mark_on_line(ax, sensitivity, sweep)
-            ax.set(ylim=(0.0, 1.05 * top), ylabel="proportion")
-            _turn_words(ax, sweep)
+            _scale_values(ax, sweep, label=SHARE_LABEL, top=1.05 * top)
         _title_panel(ax, name, discs=are_discs(*class_names(sensitivity)))
     if axes is None:
         _label_outside(panels, columns)
@@ -180,7 +186,7 @@ def plot_class_panels(
         if labels:
             style.figure_of(panels[0]).legend(handles, labels, loc="outside upper center", ncols=4)
     if mapped:
-        style.add_colorbar(panels[0].collections[0], panels, "share of runs")
+        style.add_colorbar(panels[0].collections[0], panels, SHARE_LABEL)
     return panels
 
 
@@ -309,46 +315,87 @@ def _mark_on_map(
         )  # fmt: skip
 
 
-def _draw_floor_band(ax: Axes, sensitivity: xr.Dataset) -> None:
+def _along(sweep: list[SweepAxis]) -> SweepAxis:
+    """Return the axis along which points lie: one of numbers, if there is one."""
+    return next((axis for axis in sweep if not axis.words), sweep[0])
+
+
+def _draw_floor_band(ax: Axes, sensitivity: xr.Dataset, sweep: list[SweepAxis]) -> None:
+    words = _along(sweep).words
+    span, line = (ax.axvspan, ax.axvline) if words else (ax.axhspan, ax.axhline)
     high = number_fact(sensitivity, "noise_floor_95")
     mean = number_fact(sensitivity, "noise_floor_mean")
     if np.isfinite(high):
-        ax.axhspan(0.0, high, color=style.PALE, lw=0, label=f"below the {FLOOR_LABEL}")
+        span(0.0, high, color=style.PALE, lw=0, label=f"below the {FLOOR_LABEL}")
     if np.isfinite(mean):
-        ax.axhline(mean, color=style.INK, lw=0.8, dashes=(4, 2.5), label="mean noise floor")
+        line(mean, color=style.INK, lw=0.8, dashes=(4, 2.5), label="mean noise floor")
 
 
 def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Floats, *, color: str) -> None:
-    """Draw values over one axis, one line per value of the other; words are not joined."""
-    along, *others = sweep
-    if others and along.words and not others[0].words:
-        along, others, values = others[0], [along], values.T
-    line = "none" if along.words else "-"
+    """Draw values over one axis, one line per value of the other.
+
+    Words have a row each, where they have room, and are not joined.
+    """
+    along = _along(sweep)
+    others = [axis for axis in sweep if axis is not along]
+    if along is not sweep[0]:
+        values = values.T
+    look: dict[str, Any] = {"ms": 3.5, "ls": "none" if along.words else "-", "clip_on": False}
+
+    def draw(at: Floats, value: Floats, **more: Any) -> None:
+        ax.plot(*((value, at) if along.words else (at, value)), **look, **more)
+
     if not others:
-        ax.plot(along.values, values, marker="o", ms=3.5, ls=line, color=color)
+        draw(along.values, values, marker="o", color=color)
     else:
         other = others[0]
         texts = other.words or [f"{value:.4g}" for value in other.values]
         name = other.label.split(", ")[0]
         spread = 0.12 * (np.arange(len(texts)) - (len(texts) - 1) / 2.0)
         for index, text in enumerate(texts):
-            ax.plot(
+            draw(
                 along.values + (spread[index] if along.words else 0.0), values[:, index],
-                marker=MARKERS[index % len(MARKERS)], ms=3.5, ls=line,
+                marker=MARKERS[index % len(MARKERS)],
                 color=style.PALETTE[index % len(style.PALETTE)], label=f"{name}: {text}",
             )  # fmt: skip
     if along.words:
-        ax.set_xticks(along.values, labels=along.words)
-        ax.set_xlim(-0.5, len(along.words) - 0.5)
-    ax.set_xlabel(along.label)
+        ax.set_yticks(along.values, labels=along.words)
+        ax.set(ylim=(len(along.words) - 0.5, -0.5), ylabel=along.label)
+    else:
+        ax.locator_params(axis="x", integer=bool((along.values % 1.0 == 0.0).all()))
+        ax.set_xlabel(along.label)
     ax.spines[["top", "right"]].set_visible(False)
 
 
+def _scale_values(
+    ax: Axes, sweep: list[SweepAxis], *, label: str, top: float | None = None
+) -> None:
+    """Name the axis of the values of `_draw_lines`, and begin it at 0."""
+    if _along(sweep).words:
+        ax.set(xlim=(0.0, top), xlabel=label)
+    else:
+        ax.set(ylim=(0.0, top), ylabel=label)
+
+
+def _mark_missing(ax: Axes, sweep: list[SweepAxis], values: Floats) -> None:
+    """Mark where no line has a value."""
+    along = _along(sweep)
+    others = tuple(place for place, axis in enumerate(sweep) if axis is not along)
+    at = along.values[~np.isfinite(values).any(axis=others)]
+    if at.size:
+        zero = np.zeros(at.size)
+        ax.plot(
+            *((zero, at) if along.words else (at, zero)), "x", ms=3.5, color=style.MUTED,
+            clip_on=False, label="no distance",
+        )  # fmt: skip
+
+
 def _mark_on_line(ax: Axes, sensitivity: xr.Dataset, sweep: list[SweepAxis]) -> None:
-    along = next((axis for axis in sweep if not axis.words), sweep[0])
+    along = _along(sweep)
     at = reference_value(sensitivity, along)
     if np.isfinite(at):
-        ax.axvline(at, color=style.ORANGE, lw=0.9, zorder=1, label=REFERENCE_LABEL)
+        line = ax.axhline if along.words else ax.axvline
+        line(at, color=style.INK, lw=0.7, zorder=1, label=REFERENCE_LABEL)
 
 
 def _label_outside(panels: list[Axes], columns: int) -> None:
@@ -371,22 +418,4 @@ def _title_panel(ax: Axes, name: str, *, discs: bool) -> None:
         place_sketch(
             ax, name, (1.0, 1.03), transform="axes fraction", alignment=(1.0, 0.0), cell_pt=side,
             color=style.INK, discs=discs,
-        )  # fmt: skip
-
-
-def _turn_words(ax: Axes, sweep: list[SweepAxis]) -> None:
-    """Turn the tick labels of a small panel when they are words, which would not fit abreast."""
-    if all(axis.words for axis in sweep):
-        ax.tick_params(axis="x", labelrotation=90.0)
-
-
-def _legend_above(ax: Axes) -> None:
-    handles, labels = ax.get_legend_handles_labels()
-    if labels:
-        # Fifty letters fit abreast in one column of a page.
-        narrow = 2 * max(map(len, labels)) <= 50
-        ax.legend(
-            handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0),
-            ncols=2 if narrow else 1, borderaxespad=0.2,
-            fontsize=style.FONT_PT, frameon=False,
         )  # fmt: skip

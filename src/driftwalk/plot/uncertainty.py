@@ -11,6 +11,7 @@ from driftwalk.plot.parts import style
 from driftwalk.plot.parts.labels import (
     PlotParameter,
     interval_of,
+    logarithmic,
     number_fact,
     parameter_named,
     plane_of,
@@ -91,12 +92,10 @@ def plot_distance_profile(
     --------
     ``plot_distance_profile(calibration, parameter="force_std")``
     """
-    from matplotlib.ticker import LogLocator, NullLocator
-
     along = parameter_named(calibration, parameter)
     require_variables(calibration, "ks_distance", "ks_distance_replicate", along.name)
     best, factor = along.best(calibration), along.factor
-    line = _through_optimum(calibration, along)
+    line = through_optimum(calibration, along)
     values = factor * np.asarray(line[along.name].values, dtype=np.float64)
     ax = style.axes_or_new(ax)
     interval = interval_of(calibration, f"{along.key}_interval")
@@ -136,9 +135,7 @@ def plot_distance_profile(
     # On a logarithmic scale the optimum and the noise floor, both far below 1, can be
     # distinguished.
     ax.set(yscale="log", ylim=(None, 1.15))
-    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.yaxis.set_major_formatter("{x:g}")
-    ax.yaxis.set_minor_locator(NullLocator())
+    logarithmic(ax, "y")
     along.scale(ax, "x")
     ax.set(xlabel=along.label(calibration), ylabel="KS distance D")
     ax.spines[["top", "right"]].set_visible(False)
@@ -226,7 +223,7 @@ def _histogram(calibration: xr.Dataset, ax: Axes, parameter: PlotParameter) -> N
     ax.set(xlabel=parameter.label(calibration), ylabel="recordings")
 
 
-def _through_optimum(calibration: xr.Dataset, along: PlotParameter) -> xr.Dataset:
+def through_optimum(calibration: xr.Dataset, along: PlotParameter) -> xr.Dataset:
     """Return the line of the coarse map next to the optimum in the other parameters."""
     others = [one for one in plot_parameters(calibration) if one.name != along.name]
     best = {one.name: one.best(calibration) / one.factor for one in others}

@@ -69,7 +69,7 @@ def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
         ylabel=f"share of runs with {target}", ylim=(0.0, None),
     )  # fmt: skip
     # Above: the band is anywhere.
-    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    style.legend_on_axes(ax)
     ax.spines[["top", "right"]].set_visible(False)
     return ax
 
@@ -101,11 +101,18 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     check_kind(found, "yield", "difference", "standing")
-    # 6 mm for a setting, 32 mm for legend and axis.
-    ax = style.axes_or_new(ax, height_mm=6.0 * min(found.sizes["setting"], MOST_SETTINGS) + 32.0)
     behind = found["difference"].values
     order = np.argsort(behind + (found["standing"].values == "worse"), kind="stable")
     order = order[:MOST_SETTINGS]
+    words, shared = _setting_labels(found, order)
+    if ax is None:
+        # Twenty letters leave half of one column of a page to the points; 6 mm for a setting, 32 mm
+        # for legend and axis.
+        wide = max(map(len, words)) > 20
+        ax = style.new_figure(
+            width_mm=style.DOUBLE_COLUMN_MM if wide else style.SINGLE_COLUMN_MM,
+            height_mm=6.0 * len(order) + 32.0,
+        ).add_subplot()
     for row, at in enumerate(order):
         one = found.isel(setting=at)
         reach = [
@@ -120,7 +127,6 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
         )  # fmt: skip
     within = found.attrs["indifference"]
     ax.axvspan(-within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"within {100 * within:g} %")
-    words, shared = _setting_labels(found, order)
     ax.set_yticks(range(len(order)), words)
     ax.set_ylim(len(order) - 0.4, -0.6)
     ax.locator_params(axis="x", nbins=5)

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError, argument_text, naming_its_file
+from driftwalk.core.units import in_percent
 from driftwalk.record.circle import CIRCLE, fit_circle, tank_radius_bound
 from driftwalk.record.raw import Array
 
@@ -158,7 +159,7 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
         ]
     if fit.coverage < CIRCLE.enough_visited:
         notes.append(
-            f"the body came near the rim in {fit.coverage:.0%} of the directions only: "
+            f"the body came near the rim in {in_percent(fit.coverage)} of the directions only: "
             "the fitted circle is uncertain"
         )
     arena = {"shape": "circle", "diameter_m": 2.0 * radius, "center_m": [0.0, 0.0]}

@@ -176,7 +176,7 @@ def test_the_answer_for_people_stands_side_by_side(calibrated: Path, tmp_path: P
     assert done.code == 0, done.err
     lines = done.out.splitlines()
     head = next(line for line in lines if line.startswith("class"))
-    assert head.count("90% simultaneous intervals") == 2
+    assert head.count("90 % simultaneous intervals") == 2
     row = next(line for line in lines if line.startswith("complete")).split()
     assert row.count("to") == 2
     assert any(line.startswith("l1 distance of the two: ") for line in lines)

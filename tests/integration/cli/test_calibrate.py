@@ -194,7 +194,7 @@ def test_no_force_is_printed_without_its_interval(undrawn_run: tuple[Path, Done]
     done = undrawn_run[1]
     lines = [line for line in done.out.splitlines() if "σ_F" in line and "mN" in line]
     assert len(lines) == 1
-    assert re.search(r"\d mN, redrawn every 10 ms   90% interval [\d.]+ to [\d.]+$", lines[0])
+    assert re.search(r"\d mN, redrawn every 10 ms   90 % interval [\d.]+ to [\d.]+$", lines[0])
     assert "N² s" in done.out
     assert "noise floor" in done.out
     assert "simulated by another engine" not in done.out

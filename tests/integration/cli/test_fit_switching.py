@@ -20,6 +20,7 @@ from switching_worlds import (
 )
 
 import driftwalk as dw
+from driftwalk.runs.fit import figures_of_fit
 
 COARSE = ("--force-interval", "10ms", "--spline-spacing", "3cm", "--angle", "given")
 SWITCH = ("--switching-times", f"{START_S + SWITCH_S:g}s")
@@ -65,6 +66,14 @@ def test_without_the_switch_it_does_not(recording: Path, tmp_path: Path) -> None
     )
     assert found["verdict"] == "does not explain"
     assert any("the motion changes" in reason for reason in found["verdict_reasons"])
+
+
+@pytest.mark.slow
+def test_all_flows_have_one_scale_of_colours(finished: tuple[Path, Done]) -> None:
+    fit, track = (xr.load_dataset(finished[0] / name) for name in ("fit.nc", "recording.nc"))
+    figures = figures_of_fit(fit, track, body=None, check=None)
+    tops = [figures[f"flow_{one}"]().axes[0].collections[0].get_clim() for one in "AB"]
+    assert tops[0] == tops[1]
 
 
 @pytest.mark.slow

@@ -151,7 +151,7 @@ def test_people_read_a_table_of_random_flows_without_orientation(tmp_path: Path)
     assert head in done.out
     for name in ("C_d", "σ_F", "tracking noise", "flow"):
         assert name in done.out
-    assert "angle none: for C_d to 10.0% (rms) record" in done.out
+    assert "angle none: for C_d to 10.0 % (rms) record" in done.out
     assert str(tmp_path / "run" / "recovery.nc") in done.out
     # Done is done.
     assert "--overwrite" in refusal(here(*words(path, tmp_path / "run", *options)))

@@ -340,7 +340,9 @@ def test_an_emulator_that_ends_above_its_aim_is_named() -> None:
     found = posterior_with(0.5, noise=0.13)
     assert found.attrs["emulator_noise"] == 0.13
     reason = found["reason"].values[-1]
-    assert reason.startswith("the emulator's error is 13% of the sampling error, and not below 10%")
+    assert reason.startswith(
+        "the emulator's error is 13 % of the sampling error, and not below 10 %"
+    )
 
 
 @pytest.mark.slow

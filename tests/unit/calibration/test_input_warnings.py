@@ -23,7 +23,7 @@ def track(share: float, count: int = 1000) -> Track:
 def test_it_says_how_often_and_what_was_taken() -> None:
     found = wall_warning(track(0.25), dw.Study())
     assert found is not None
-    assert "in 25% of the samples" in found
+    assert "in 25 % of the samples" in found
     assert "restitution 0.5, friction 0" in found
     assert wall_warning(track(WALL_WARNING.notable_share), dw.Study()) is None
 

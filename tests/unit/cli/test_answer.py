@@ -33,9 +33,9 @@ def test_an_estimate_is_a_row_in_the_units_of_a_reader(capsys: pytest.CaptureFix
     found = answer()
     print_parts(estimates(found))
     assert capsys.readouterr().out.splitlines() == [
-        "drag coefficient C_d   0.4000   95% interval 0.3500 to 0.4500",
+        "drag coefficient C_d   0.4000   95 % interval 0.3500 to 0.4500",
         "stochastic force σ_F   not determined by this recording",
-        "tracking noise         2.000e-05 mm   95% interval 1.000e-05 to 4.000e-05",
+        "tracking noise         2.000e-05 mm   95 % interval 1.000e-05 to 4.000e-05",
         "swim speed             0.05000 m/s   no interval without a bootstrap",
     ]
 

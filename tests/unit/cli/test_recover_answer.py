@@ -23,7 +23,7 @@ def test_counts_and_warnings_of_what_is_left_out() -> None:
     said = [
         text for text in recovery_answer(found).warnings if text.startswith("40 min, angle given")
     ]
-    assert "1 of 30 recordings have more than 30% of their intervals at the wall" in said[0]
+    assert "1 of 30 recordings have more than 30 % of their intervals at the wall" in said[0]
     assert "2 of 30 recordings could not be fitted: only 3 of 9 intervals" in said[1]
 
 

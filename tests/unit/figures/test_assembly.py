@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import matplotlib
+import numpy as np
 import pytest
+import xarray as xr
+from matplotlib.text import Text
 from synthetic_assembly import (
     assembly_path,
     class_times,
@@ -19,6 +22,7 @@ from driftwalk.figures import assembly, sensitivity_figures
 from driftwalk.figures.write import write_figures
 from driftwalk.plot.outcome_bars import plot_outcomes
 from driftwalk.plot.parts.style import figure_of, print_style
+from driftwalk.plot.yields import plot_yield_front
 
 
 @pytest.fixture(scope="module")
@@ -122,3 +126,44 @@ def test_every_text_lies_inside_its_figure(name) -> None:
             assert box.y0 >= -0.5, text
             assert box.x1 <= figure.bbox.x1 + 0.5, text
             assert box.y1 <= figure.bbox.y1 + 0.5, text
+
+
+def two_settings(words: list[str]) -> xr.Dataset:
+    """Return a `yield` of two settings that differ in two axes, each ahead for half of the time."""
+    time = np.linspace(0.0, 300.0, 31)
+    first, second = 0.5 * time / 300.0, np.minimum(0.4, time / 300.0)
+    front = np.maximum(first, second)
+    return xr.Dataset(
+        {
+            "share": (("setting", "time"), [first, second]),
+            "front_yield": ("time", front),
+            "front_yield_low": ("time", 0.9 * front),
+            "front_yield_high": ("time", 1.1 * front),
+            "front_setting": ("time", (second > first).astype(int)),
+            "latching": ("setting", words),
+            "flow_scale": ("setting", [1.469, 1.156]),
+        },
+        {"time": time, "setting": [0, 1]},
+        {"kind": "yield", "best": 0, "by_s": 300.0, "confidence": 0.9, "target": "T"},
+    )
+
+
+@pytest.mark.parametrize("words", [["a", "b"], ["collision", "connector"]])
+def test_long_names_of_settings_leave_room_for_the_yields(words: list[str]) -> None:
+    with print_style():
+        ax = plot_yield_front(two_settings(words))
+        figure = figure_of(ax)
+        figure.draw_without_rendering()
+        legend = ax.get_legend().get_window_extent()
+    assert 0.0 <= legend.x0 < legend.x1 <= figure.bbox.width
+    assert ax.get_window_extent().width > 0.6 * figure.bbox.width
+
+
+def test_all_names_of_classes_have_one_size() -> None:
+    names = ["chain4", "star4", "paw", "chain3+1", "triangle+1", "2+2", "2+1+1", "1+1+1+1"]
+    outcomes = distribution().isel({"class": slice(8)}).assign_coords({"class": names})
+    with print_style():
+        ax = plot_outcomes(outcomes)
+        shown = [text for text in ax.findobj(Text) if text.get_text().partition("\n")[0] in names]
+    assert {text.get_text().replace("\n", "") for text in shown} == {*names}
+    assert {text.get_fontsize() for text in shown} == {7.0}

@@ -40,6 +40,6 @@ def test_the_axis_fits_the_losses(worst: float, scale: str) -> None:
 def test_laws_without_a_solution_are_counted(tmp_path: Path) -> None:
     fit = compared([1.0, np.nan, 0.9])
     ax = plot_laws(fit, new_figure(width_mm=120.0, height_mm=55.0).add_subplot())
-    assert ax.get_title() == "not shown, without a solution: 1"
+    assert ax.get_title(loc="right") == "not shown, without a solution: 1"
     written = write_figures(laws_figures(fit), tmp_path)
     assert [path.name for path in written] == ["laws.png", "laws.svg"]

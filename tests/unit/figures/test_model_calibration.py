@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from every_kind import every_kind
@@ -49,6 +50,32 @@ def test_a_profile_is_least_at_its_middle_and_has_the_interval(found: xr.Dataset
         rise = ax.lines[0].get_ydata()
         assert rise.argmin() == rise.size // 2
         assert [line.get_xdata()[0] for line in ax.lines[2:4]] == interval.tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("interval", "half_width", "words"),
+    [
+        ((0.02, 0.03), 0.2, "(± 20 %)"),
+        # Around 0 the half width is over a part of the range.
+        ((-0.04, 0.09), 0.22, "(0 is within)"),
+        ((0.0, 0.09), np.inf, "(to an end of the range)"),
+        ((np.nan, np.nan), np.nan, ""),
+    ],
+)
+def test_a_value_that_is_not_determined_says_how_wide_it_is(
+    found: xr.Dataset, interval: tuple[float, float], half_width: float, words: str
+) -> None:
+    wide = found.copy(deep=True)
+    changed = {
+        "determined": False, "scale": "linear", "estimate": 0.025, "half_width": half_width,
+        "interval": interval,
+    }  # fmt: skip
+    for name, value in changed.items():
+        wide[name].values[:] = value
+    for ax in profiles_figure(wide).axes:
+        if ax.get_visible():
+            assert ax.get_title(loc="left") == f"not determined\n{words}"
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -21,7 +22,8 @@ from driftwalk.plot import (
     map as plot_ks_map,
     refined_map as plot_refined_map,
 )
-from driftwalk.plot.parts.style import new_figure
+from driftwalk.plot.parts.labels import logarithmic
+from driftwalk.plot.parts.style import new_figure, print_style
 from driftwalk.plot.step_densities import shared_setting_text
 from driftwalk.schema.parameters import stored_parameters
 
@@ -49,6 +51,22 @@ def test_parameters_are_read_from_the_dimensions():
     assert [one.key for one in stored] == ["speed_m_s", "tumble_rate_per_s"]
     assert [one.label for one in stored] == ["speed", "rate of tumbles"]
     assert [one.is_log for one in stored_parameters(one_parameter())] == [True]
+
+
+@pytest.mark.parametrize(
+    "limits", [(0.028, 0.033), (0.18, 1.05), (0.3, 0.45), (0.02, 4.0), (1e-6, 12.0)]
+)
+def test_numbers_along_a_logarithmic_axis_do_not_overlap(limits):
+    with print_style():
+        ax = new_figure(width_mm=45.0, height_mm=45.0).add_subplot()
+        ax.set_xlim(limits)
+        logarithmic(ax, "x")
+        ax.figure.draw_without_rendering()
+        every = zip(ax.get_xticks(), ax.get_xticklabels(), strict=True)
+        shown = [text for at, text in every if limits[0] <= at <= limits[1] and text.get_text()]
+        boxes = [text.get_window_extent() for text in shown]
+    assert len(shown) >= 2
+    assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
 
 
 @pytest.mark.parametrize("draw", [plot_ks_map, plot_refined_map, plot_bootstrap])

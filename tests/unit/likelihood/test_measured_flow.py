@@ -183,7 +183,7 @@ def test_a_scale_that_is_off_is_found_and_leaves_the_drag_alone() -> None:
     scale = wrong["estimate"].sel(parameter="measured_flow_scale")
     assert abs(scale - 1.15) < 3.0 * float(wrong["measured_flow_scale_std"])
     assert float(wrong["measured_flow_scale_p_value"]) < MEASURED.level
-    assert any("15% too fast" in text for text in wrong["warning"].values)
+    assert any("15 % too fast" in text for text in wrong["warning"].values)
     assert not any("measured flow" in text for text in right["warning"].values)
     drag, other = (
         float(one["estimate"].sel(parameter="drag_coefficient")) for one in (right, wrong)

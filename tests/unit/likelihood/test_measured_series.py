@@ -117,7 +117,7 @@ def test_mean_and_modes_are_those_of_the_flow_within_their_errors() -> None:
         plain = np.isfinite(one.velocity[part])
         off = (one.velocity[part] - true)[plain] / (ERROR / np.sqrt(0.95 * time.size))
         assert np.sqrt((off**2).mean()) == pytest.approx(1.0, abs=0.1)  # 4 sd
-    assert "in modes of 30% of the mean" in one.sentence
+    assert "in modes of 30 % of the mean" in one.sentence
 
 
 @pytest.mark.slow

@@ -101,7 +101,7 @@ def along_a_line(length: float) -> Track:
 
 def test_the_reason_of_no_solution_is_named() -> None:
     wide = [along_a_line(0.1)]
-    for share, said in ((0.97, "97% of the intervals are at the wall"), (0.3, "at all, or the")):
+    for share, said in ((0.97, "97 % of the intervals are at the wall"), (0.3, "at all, or the")):
         reason = reason_of_no_solution(share, wide, Study())
         with pytest.raises(InputError, match=said), solved(reason):
             raise np.linalg.LinAlgError
@@ -121,7 +121,9 @@ def test_a_fit_that_breaks_down_at_the_wall_says_so(monkeypatch: pytest.MonkeyPa
     # In this tank a block of 3 cm touches the wall from most of the places of the recording.
     reach = float(np.hypot(track["x"], track["y"]).max())
     narrow = apply_overrides(coarse_study(), {"tank.diameter_m": 2.0 * reach + 0.002})
-    with pytest.raises(InputError, match=r"\d% of the intervals are at the wall and were left out"):
+    with pytest.raises(
+        InputError, match=r"\d % of the intervals are at the wall and were left out"
+    ):
         dw.fit_motion(track, narrow)
 
 

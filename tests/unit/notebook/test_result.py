@@ -35,8 +35,8 @@ def answer(**more: object) -> xr.Dataset:
 def test_the_answer_comes_first() -> None:
     found = as_result(answer(verdict="explains"))
     assert repr(found).splitlines() == [
-        "drag coefficient C_d   0.3930   90% interval 0.3880 to 0.3980",
-        "stochastic force σ_F   0.5500 mN, redrawn every 16 ms   90% interval 0.5400 to 0.5600",
+        "drag coefficient C_d   0.3930   90 % interval 0.3880 to 0.3980",
+        "stochastic force σ_F   0.5500 mN, redrawn every 16 ms   90 % interval 0.5400 to 0.5600",
         "tracking noise         not determined by this recording",
         "verdict                explains",
         f"<Result: {len(found.data_vars)} variables, {len(found.attrs)} attributes>",
@@ -103,7 +103,7 @@ def test_numbers_survive_to_four_digits(value: float, low: float, high: float) -
     found["interval"][1] = [low * value, high * value]
     line = answer_lines(found)[1]
     shown = line.removeprefix("stochastic force σ_F")
-    for words in (" mN, redrawn every 16 ms", "90% interval", "to"):
+    for words in (" mN, redrawn every 16 ms", "90 % interval", "to"):
         shown = shown.replace(words, "")
     numbers = [1e-3 * float(part) for part in shown.split()]
     # Four significant digits: half a unit of the fourth.

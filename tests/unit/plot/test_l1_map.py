@@ -112,14 +112,39 @@ def test_one_axis_of_numbers_is_a_line_over_the_band_of_the_floor() -> None:
     assert ax.get_xlabel() == "tank diameter (cm)"
 
 
-def test_an_axis_of_words_is_points_that_are_not_joined() -> None:
-    data = one_axis("latching", ["none", "collision", "connector"])
+def test_words_have_a_row_each_and_their_points_are_not_joined() -> None:
+    words = ["none", "collision", "connector"]
+    data = one_axis("latching", words)
     ax = plot_l1_map(data.assign_attrs(reference_latching="collision"))
     points = next(line for line in ax.lines if line.get_marker() == "o")
     assert points.get_linestyle() == "None"
-    np.testing.assert_allclose(points.get_ydata(), data["l1_distance"])
-    assert [text.get_text() for text in ax.get_xticklabels()] == ["none", "collision", "connector"]
-    assert line_named(ax, "reference").get_xdata()[0] == 1.0
+    np.testing.assert_allclose(points.get_xdata(), data["l1_distance"])
+    low, high = ax.get_ylim()
+    # The first word is the highest row.
+    assert [points.get_ydata().tolist(), low > high] == [[0.0, 1.0, 2.0], True]
+    assert [text.get_text() for text in ax.get_yticklabels()] == words
+    assert line_named(ax, "reference").get_ydata()[0] == 1.0
+    (band,) = ax.patches
+    assert (band.get_x(), band.get_x() + band.get_width()) == (0.0, 0.18)
+
+
+def test_no_label_of_a_study_of_words_is_turned() -> None:
+    rows = one_axis("latching", ["none", "a very long word", "another very long word"])
+    both = rows.expand_dims(hidden_face_drag=["none", "full"]).copy(deep=True)
+    for ax in [plot_l1_map(both), *plot_class_panels(both)]:
+        ax.figure.draw_without_rendering()
+        labels = [*ax.get_xticklabels(), *ax.get_yticklabels()]
+        assert all(text.get_rotation() == 0.0 for text in labels)
+
+
+def test_a_setting_without_a_distance_is_marked() -> None:
+    data = one_axis("blocks", [2, 3, 4, 5]).copy(deep=True)
+    data["l1_distance"][:2] = np.nan
+    ax = plot_l1_map(data)
+    np.testing.assert_allclose(line_named(ax, "no distance").get_xdata(), [2, 3])
+    low, high = ax.get_xlim()
+    assert low < 2.0 < 5.0 < high
+    assert all(tick % 1.0 == 0.0 for tick in ax.get_xticks())
 
 
 def test_numbers_and_words_give_one_line_per_word() -> None:

@@ -16,6 +16,7 @@ from driftwalk.assembly.outcome_posterior.records import BOTH, CLASSES, EARLY, J
 from driftwalk.assembly.outcome_posterior.region import REGION_POLICY, intervals_of, weights_of
 from driftwalk.core.arrays import Floats
 from driftwalk.core.study_keys import INFERRED_KEYS
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.answers.outcome_posterior import (
     BOTH_ENDS,
@@ -72,8 +73,8 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
     reasons = _reasons(problem, chosen, limit, checked, used, unlike)
     if used and noise >= DESIGN_POLICY.noise:
         reasons.append(
-            f"the emulator's error is {noise:.0%} of the sampling error, and not below "
-            f"{DESIGN_POLICY.noise:.0%}: give more runs of a node (runs)"
+            f"the emulator's error is {in_percent(noise)} of the sampling error, and not below "
+            f"{in_percent(DESIGN_POLICY.noise)}: give more runs of a node (runs)"
         )
     verdict = "determined"
     if not explained:
@@ -191,7 +192,7 @@ def _reasons(
         return found
     if used is None:
         lacking = ", ".join(
-            f"those of {kind} hold {min(one.joint, *one.marginal):.0%}"
+            f"those of {kind} hold {in_percent(min(one.joint, *one.marginal))}"
             for kind, one in checked.coverage.items()
             if kind in problem.kinds
         )
@@ -201,7 +202,8 @@ def _reasons(
         words = axis_number(name).plain
         if side == NO_END:
             found.append(
-                f"cannot tell {words}: its interval is {(high - low) / policy.confidence:.0%} of "
+                f"cannot tell {words}: its interval is "
+                f"{in_percent((high - low) / policy.confidence)} of "
                 "the one without data"
             )
         elif side != BOTH_ENDS:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.comparison.aspects import AspectPlan, resampled
 from driftwalk.core.arrays import Floats
+from driftwalk.core.units import in_percent
 from driftwalk.motion import Worlds
 
 
@@ -113,7 +114,8 @@ def bout_sentences(found: tuple[BoutDistance, ...]) -> Iterator[str]:
         if one.tail > one.tail_limit:
             yield (
                 f"the lengths of {one.kind} bouts have a heavier tail: the longest twentieth takes "
-                f"{one.tail:.0%} of their time, of its own recordings below {one.tail_limit:.0%}"
+                f"{in_percent(one.tail)} of their time, of its own recordings below "
+                f"{in_percent(one.tail_limit)}"
             )
 
 

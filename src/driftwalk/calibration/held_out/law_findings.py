@@ -20,6 +20,7 @@ from driftwalk.calibration.held_out.held_out_score import (
 )
 from driftwalk.calibration.held_out.recorded import CHECKS, RecordedMotion
 from driftwalk.calibration.stationarity import unsteady_motion
+from driftwalk.core.units import in_percent
 from driftwalk.simulation.series import is_series
 
 
@@ -133,8 +134,8 @@ def law_findings(
     if share > VERDICT.most_wall_share:
         unable.insert(
             0,
-            f"the body was at the wall for {share:.1%} of the time: how it moves away from it was "
-            "hardly recorded; record it in a larger tank",
+            f"the body was at the wall for {in_percent(share, decimals=1)} of the time: how it "
+            "moves away from it was hardly recorded; record it in a larger tank",
         )
         return Findings([], [*unable, *against])
     return Findings(against, unable)

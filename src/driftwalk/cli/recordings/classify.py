@@ -24,6 +24,7 @@ from driftwalk.cli.terminal.output import (
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE
 from driftwalk.core.study_keys import STUDY_KEYS
+from driftwalk.core.units import in_percent
 from driftwalk.schema.shapes import is_one_assembly, short_class
 
 if TYPE_CHECKING:
@@ -239,7 +240,7 @@ def _rate_table(summary: dict[str, Any]) -> None:
     """Print the rates, where anything joined or parted."""
     if not summary["events"]:
         return
-    interval = f"{summary['rate_confidence']:.0%} interval"
+    interval = f"{in_percent(summary['rate_confidence'])} interval"
     rows = []
     for name, rates in summary["rates"].items():
         cells: list[Any] = [short_class(name)]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.units import in_percent
 from driftwalk.likelihood.check.errors import Innovations
 from driftwalk.likelihood.check.place import Layout, LocalMeans, Residuals, Spread, Trend
 from driftwalk.likelihood.check.posterior_predictive import MotionComparison
@@ -134,7 +135,7 @@ class Criterion(NamedTuple):
         """The finding where it is sure, but too small to change the verdict."""
         if self.failed or not self.p_value < VERDICT.level:
             return None
-        sizes = self.measure.format(self.size, self.least)
+        sizes = self.measure.format(self.size, self.least).replace("%", " %")
         return f"too small to change the verdict: {sizes} is tolerated; {self.sentence}"
 
 
@@ -197,7 +198,8 @@ def tail_criterion(white: WhitenessTests, components: tuple[str, ...]) -> Criter
         min(1.0, len(components) * float(white.kurtosis_p_value[worst])),
         f"the errors of prediction are not normal: excess kurtosis of {components[worst]} "
         f"{white.excess_kurtosis[worst]:+.2f}, expected 0 ± {white.kurtosis_std:.2f} "
-        f"({white.tail_share[worst]:.2%} beyond 3 sd, expected 0.27 %): the force comes in bursts, "
+        f"({in_percent(white.tail_share[worst], decimals=2)} beyond 3 sd, expected 0.27 %): the "
+        "force comes in bursts, "
         "or the tracker slips",
         detectable_sigmas(0.5 * VERDICT.level / len(components)) * white.kurtosis_std,
     )
@@ -218,7 +220,8 @@ def outlier_criterion(errors: Sequence[Innovations], mistakes: int) -> Criterion
     return Criterion(
         "outliers",
         0.0 if share > VERDICT.most_outliers and outliers > expected else 1.0,
-        f"{outliers} of {samples} samples ({share:.2%}) are further than 6 sd from where they were "
+        f"{outliers} of {samples} samples ({in_percent(share, decimals=2)}) are further than 6 sd "
+        "from where they were "
         f"predicted and were left out, expected {expected or 'none'}: jumps of the tracker, "
         "contacts, or bursts",
         # Their number scatters by its root.
@@ -304,7 +307,8 @@ def strength_criterion(trend: Trend, layout: Layout) -> Criterion:
         "flow strength",
         float(chi2.sf(trend.chi_squared, trend.dof)),
         f"the strength of the flow changes: {layout.time_of(worst)} it is "
-        f"{trend.change[worst]:+.1%} off its mean, expected 0 ± {trend.std[worst]:.1%} "
+        f"{in_percent(trend.change[worst], decimals=1, sign=True)} off its mean, expected 0 ± "
+        f"{in_percent(trend.std[worst], decimals=1)} "
         f"(chi squared {trend.chi_squared:.0f}, expected {trend.dof} ± "
         f"{math.sqrt(2 * trend.dof):.0f})",
         math.sqrt(detectable_noncentrality(trend.dof, VERDICT.level))
@@ -329,8 +333,9 @@ def drag_criterion(trend: Trend, edges: Floats) -> Criterion:
         "drag law",
         min(1.0, 2.0 * off.size * float(norm.sf(off[worst]))),
         f"one C_d does not serve at all speeds: at {edges[worst]:.3g} to {edges[worst + 1]:.3g} "
-        f"m/s past the block it would be {trend.change[worst]:+.0%} off, expected 0 ± "
-        f"{std[worst]:.0%}: the drag is not the square law, or not that of a block",
+        f"m/s past the block it would be {in_percent(trend.change[worst], sign=True)} off, "
+        "expected 0 ± "
+        f"{in_percent(std[worst])}: the drag is not the square law, or not that of a block",
         detectable_sigmas(0.5 * VERDICT.level / off.size) * float(np.median(std)),
         LARGEST.drag,
     )

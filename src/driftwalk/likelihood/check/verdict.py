@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from math import isnan
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from driftwalk.core.units import in_percent
 from driftwalk.likelihood.check.criteria import Criterion
 from driftwalk.likelihood.result import visited_shares
 from driftwalk.likelihood.warnings import meaningless_of
@@ -108,7 +109,8 @@ def _too_little_seen(fit: xr.Dataset, *, side_m: float) -> Iterator[str]:
     blocks = share * int(inside.sum()) * (float(fit["cell_size"]) / side_m) ** 2
     if share < INFORMATION.least_visited and blocks < INFORMATION.least_blocks:
         yield (
-            f"the block has been over {share:.0%} of the tank, {blocks:.1f} times its own area: "
+            f"the block has been over {in_percent(share)} of the tank, {blocks:.1f} times its own "
+            "area: "
             "the flow, and with it C_d, is not known from so little; record it on a wider path, "
             "with another setting of the pumps"
         )
@@ -119,8 +121,8 @@ def _too_often_at_wall(share: float, drag_std: float) -> Iterator[str]:
     limit = INFORMATION.most_drag_std_at_wall
     if INFORMATION.wall_share_in_doubt < share <= INFORMATION.most_wall_share and drag_std > limit:
         yield (
-            f"the block was at the wall for {share:.0%} of the time, and C_d is known to "
-            f"{drag_std:.1%} only: what is left between the contacts may mislead; record for "
+            f"the block was at the wall for {in_percent(share)} of the time, and C_d is known to "
+            f"{in_percent(drag_std, decimals=1)} only: what is left between the contacts may mislead; record for "
             "longer, or where the block stays away from the wall"
         )
 

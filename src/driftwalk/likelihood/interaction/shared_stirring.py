@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.run_stages import Course
+from driftwalk.core.units import in_percent
 from driftwalk.likelihood.filter.difference_pairs import unpacked
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
@@ -301,7 +302,9 @@ def _answer(
     }
     if low > 0.0:
         return facts, []
-    most = f": at most {1e3 * high:.3g} mm ({confidence:.0%})" if math.isfinite(high) else ""
+    most = (
+        f": at most {1e3 * high:.3g} mm ({in_percent(confidence)})" if math.isfinite(high) else ""
+    )
     return facts, [f"cannot tell a length of the stirring from none{most}"]
 
 

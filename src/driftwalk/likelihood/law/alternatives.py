@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
+from driftwalk.core.units import in_percent
 from driftwalk.likelihood.filter.series import Series, usable_intervals
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, is_retained
 from driftwalk.likelihood.law.shape_changes import ShapeChange, find_shape_change
@@ -87,7 +88,8 @@ class Alternatives:
 
     def _without(self, alone: Mode | None, name: str, share: float) -> str:
         left = (
-            f"the {share:.0%} of the intervals that are half a side or more from the wall and not "
+            f"the {in_percent(share)} of the intervals that are half a side or more from the wall "
+            "and not "
             "next to a gap"
         )
         if alone is None or not alone.converged:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.core.intervals import proportion_interval
+from driftwalk.core.units import in_percent
 from driftwalk.page.parts import (
     Maker,
     Section,
@@ -173,7 +174,7 @@ def share_section(test: xr.Dataset) -> Section:
         drawn.append(series(str(name), time, share, ends=ends))
     target = short_class(str(required(test, "target")))
     return chart(
-        "share", "Target over time", f"Bands: {facts['confidence']:.0%} intervals.",
+        "share", "Target over time", f"Bands: {in_percent(facts['confidence'])} intervals.",
         x=label("time", "s"), y=label(f"share of worlds in {target}"), series=drawn,
     )  # fmt: skip
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from driftwalk.core.units import in_percent
 from driftwalk.page.parts import (
     Maker,
     Section,
@@ -84,7 +85,7 @@ def yield_summary(yields: xr.Dataset) -> Section:
     shown = [
         figure(
             f"yield of {target} by {facts['by_s']:g} s", float(best["fresh_yield"]),
-            note=f"{percent(low)} to {percent(high)}, {facts['confidence']:.0%} interval",
+            note=f"{percent(low)} to {percent(high)}, {in_percent(facts['confidence'])} interval",
         )
     ]  # fmt: skip
     return summary_section(paragraphs, shown)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -126,14 +126,23 @@ def number_fact(dataset: xr.Dataset, name: str) -> float:
     return float(facts_of(dataset).get(name, math.nan))
 
 
-def ratio_axis(ax: Axes) -> None:
-    """Make the horizontal axis logarithmic, with plain numbers that have room: 0.5, 1, 2."""
-    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullLocator
+def logarithmic(ax: Axes, which: Literal["x", "y"]) -> None:
+    """Make an axis with its limits logarithmic; over less than three decades it has plain numbers.
 
-    ax.set_xscale("log")
-    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-    ax.xaxis.set_minor_locator(NullLocator())
+    The numbers have room: 0.5, 1, 2 over a decade or more, and even steps over less, where
+    matplotlib would write 3 × 10⁻¹ next to 4 × 10⁻¹.
+    """
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullLocator
+
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    (ax.set_xscale if which == "x" else ax.set_yscale)("log")
+    low, high = ax.get_xlim() if which == "x" else ax.get_ylim()
+    if high > 1e3 * low:
+        return
+    even = MaxNLocator(5, steps=[1, 2, 5, 10])
+    axis.set_major_locator(even if high < 10.0 * low else LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_locator(NullLocator())
 
 
 @dataclass(frozen=True)
@@ -200,10 +209,10 @@ class PlotParameter:
         unit = f" {self.unit}" if self.unit else ""
         return f"{self.factor * value:.3g}{unit}"
 
-    def scale(self, ax: Axes, which: str) -> None:
-        """Give an axis of a figure the parameter's scale."""
+    def scale(self, ax: Axes, which: Literal["x", "y"]) -> None:
+        """Give an axis of a figure that has its limits the parameter's scale."""
         if self.stored.is_log:
-            (ax.set_xscale if which == "x" else ax.set_yscale)("log")
+            logarithmic(ax, which)
 
 
 DRAG = PlotParameter(StoredParameter("drag_coefficient", "1", "C_d", "linear"), "$C_d$", "")

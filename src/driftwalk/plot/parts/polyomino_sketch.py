@@ -330,6 +330,13 @@ def draw_sketches_below(ax: Axes, positions: Sequence[float], names: Sequence[st
     return deepest + 8.0
 
 
+def names_fit(names: Sequence[str], width_pt: float) -> bool:
+    """Return whether `draw_sketches_below` writes all names in full size on axes of that width."""
+    letters = int(width_pt / max(len(names), 1) / LETTER_PT)
+    lines = [line for name in names for line in _lines(name_text(name), letters)]
+    return max(map(len, lines), default=0) <= letters
+
+
 def _lines(text: str, letters: int) -> list[str]:
     """Return the name of a class in lines of at most so many letters, broken before a plus.
 

@@ -245,6 +245,18 @@ def legend_above(figure: Figure, ax: Axes, columns: int) -> None:
     figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=columns)
 
 
+def legend_on_axes(ax: Axes) -> None:
+    """Put a legend above axes, from their left edge on, where no data can be."""
+    handles, labels = ax.get_legend_handles_labels()
+    if labels:
+        # Fifty letters fit abreast in one column of a page.
+        narrow = 2 * max(map(len, labels)) <= 50
+        ax.legend(
+            handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0),
+            ncols=2 if narrow else 1, borderaxespad=0.2, fontsize=FONT_PT, frameon=False,
+        )  # fmt: skip
+
+
 def legend_below(ax: Axes, columns: int, **named: Any) -> None:
     """Put a legend under the label of the horizontal axis, where no data can be."""
     from matplotlib.transforms import ScaledTranslation

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each
 from driftwalk.schema.answers.steady_state import steady_json, steady_parts
 
@@ -162,7 +163,7 @@ def _json(found: xr.Dataset, sizes: xr.Dataset | None) -> dict[str, Any]:
 def _classes(found: xr.Dataset, drawn: xr.Dataset | None) -> Table:
     """Return how often each class came, the frequent ones only where there are many."""
     both = [found] if drawn is None else [found, drawn]
-    interval = f"{found.attrs['confidence']:.0%} simultaneous intervals"
+    interval = f"{in_percent(found.attrs['confidence'])} simultaneous intervals"
     heads = [
         "class",
         "share",
@@ -238,7 +239,7 @@ def _sizes_json(sizes: xr.Dataset) -> dict[str, Any]:
 def _sizes(distribution: xr.Dataset, sizes: xr.Dataset, what: str) -> list[Part]:
     """Return the sizes at the end of the runs, and how they grew."""
     facts = sizes.attrs
-    interval = f"{facts['confidence']:.0%} interval"
+    interval = f"{in_percent(facts['confidence'])} interval"
     rows = []
     for row in each(sizes, "size"):
         if row["number"] > 0:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.intervals import proportion_interval
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.parts import Answer, Part, Row, Table, each
 from driftwalk.schema.shapes import short_class
 
@@ -34,7 +35,7 @@ def policy_answer(found: xr.Dataset) -> Answer:
         f"{facts['worlds_used']} worlds of {facts['blocks']} blocks simulated",
         Row(
             f"{short_class(str(facts['target']))} by {facts['by_s']:g} s",
-            f"{facts['reached']:.3f}   {facts['confidence']:.0%} interval "
+            f"{facts['reached']:.3f}   {in_percent(facts['confidence'])} interval "
             f"{facts['reached_low']:.3f} to {facts['reached_high']:.3f}, in {facts['worlds']} "
             "fresh worlds",
         ),
@@ -65,7 +66,7 @@ def mode_table(policy: xr.Dataset) -> Table:
         share = float(one["constant_reached"])
         low, high = proportion_interval(round(share * count), count, confidence=confidence)
         rows.append([str(one["mode"].values), f"{share:.3f}", f"{low:.3f} to {high:.3f}"])
-    return Table(rows, ["mode", "reaches it alone", f"{confidence:.0%} interval"])
+    return Table(rows, ["mode", "reaches it alone", f"{in_percent(confidence)} interval"])
 
 
 def trial_answer(found: xr.Dataset) -> Answer:
@@ -125,7 +126,7 @@ def arm_table(test: xr.Dataset) -> Table:
         ]
         for at, one in enumerate(each(test, "arm"))
     ]
-    share = f"{test.attrs['confidence']:.0%} interval"
+    share = f"{in_percent(test.attrs['confidence'])} interval"
     target = short_class(str(test.attrs["target"]))
     columns = ["arm", f"{target} by {test.attrs['by_s']:g} s", share, "gain over it", share]
     return Table(rows, columns)

@@ -11,6 +11,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import (
     FAR_ABOVE_FLOOR,
     facts_of,
@@ -114,7 +115,8 @@ def fitted_parts(fit: xr.Dataset, *, hint: str = "") -> list[Part]:
     if "wall_share" in facts:
         asked = "wall_contacts" in facts or "wall_left_out" in facts
         tells = facts.get("angle") == "state" and facts["wall_share"] > TELLING_SHARE
-        said = f"{facts['wall_share']:.1%}, left out{hint if tells and not asked else ''}"
+        left_out = in_percent(facts["wall_share"], decimals=1)
+        said = f"{left_out}, left out{hint if tells and not asked else ''}"
         parts.append(Row("intervals at the wall", said))
     if "flow" in fit.dims and "switching_times_s" in facts:
         names = ", ".join(map(str, fit["flow"].values[fit["interval_flow"].values]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.parts import Answer, Part, Row, Table, each
 from driftwalk.schema.shapes import short_class
@@ -73,7 +74,7 @@ def score_table(found: xr.Dataset) -> Table:
 
 def rate_table(found: xr.Dataset, source: int) -> Table:
     """Return the rates of one data set."""
-    share = f"{found.attrs['confidence']:.0%} interval"
+    share = f"{in_percent(found.attrs['confidence'])} interval"
     rows = [
         [
             transition_text(one),

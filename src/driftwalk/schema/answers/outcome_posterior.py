@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.parts import Answer, Estimate, Part, Row, Table, each
 from driftwalk.schema.description import Number
@@ -87,7 +88,7 @@ def agreement(found: xr.Dataset) -> str:
     """Return how well the model agrees with the outcomes, and how precise the emulator is."""
     return (
         f"p = {float(found.attrs['p']):.2g} that simulated runs agree no better; emulator's error "
-        f"{float(found.attrs['emulator_noise']):.0%} of the sampling error"
+        f"{in_percent(float(found.attrs['emulator_noise']))} of the sampling error"
     )
 
 
@@ -114,7 +115,7 @@ def data_table(found: xr.Dataset) -> Table:
             str(one["data"].values),
             f"{round(truths * float(one['coverage']))} of {truths}",
             f"{float(one['power']):.1f}" if bool(one["offered"]) else "not offered",
-            *(f"{float(width):.0%}" for width in one["expected_width"].values),
+            *(in_percent(float(width)) for width in one["expected_width"].values),
             "yes" if bool(one["observed"]) else "",
         ]
         for one in each(found, "data")

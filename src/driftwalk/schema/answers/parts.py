@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
+from driftwalk.core.units import in_percent
 from driftwalk.schema.description import Number
 from driftwalk.schema.kinds.fit import PARAMETERS
 
@@ -70,9 +71,9 @@ class Estimate(NamedTuple):
         Examples
         --------
         >>> Estimate(Number("jitter", "s", shown="ms"), 0.01, (0.009, 0.011), 0.9).text
-        '10.00 ms   90% interval 9.000 to 11.00'
+        '10.00 ms   90 % interval 9.000 to 11.00'
         >>> Estimate(Number("friction"), 1.2, (0.9, float("inf")), 0.9, role="wall").text
-        '1.200   90% interval 0.9000 or more'
+        '1.200   90 % interval 0.9000 or more'
         """
         if self.unknown:
             return NOT_DETERMINED
@@ -95,7 +96,7 @@ class Estimate(NamedTuple):
             return f"{value:.4g}{unit}, as stated"
         if math.isinf(value):
             return f"so large that it makes no difference ({ends})"
-        share = "" if self.confidence is None else f"{self.confidence:.0%} "
+        share = "" if self.confidence is None else f"{in_percent(self.confidence)} "
         return f"{number_text(value, digits)}{unit}{self.after}   {share}interval {ends}"
 
 

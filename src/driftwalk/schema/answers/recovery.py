@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.parts import Answer, Part, Table, each, length_text
 from driftwalk.schema.kinds.recovery import RECOVERED
 from driftwalk.schema.parameters import flat_name
@@ -48,7 +49,7 @@ def recovery_answer(found: xr.Dataset) -> Answer:
         f"{1e3 * truth['tracking_noise_m']:.3g} mm, flow: {truth['flow']}",
         Table(
             [row for part in _parts(found) for row in _rows(part)],
-            [*_COLUMNS, f"{truth['confidence']:.0%} intervals that hold the truth"],
+            [*_COLUMNS, f"{in_percent(truth['confidence'])} intervals that hold the truth"],
         ),
         *map(_needed_sentence, each(found, "angle")),
     ]
@@ -100,8 +101,8 @@ def _warnings(found: xr.Dataset) -> list[str]:
         if number["at_the_wall"]:
             said.append(
                 f"{where}: {number['at_the_wall']} of {number['recordings']} recordings have more "
-                f"than {found.attrs['most_wall_share']:.0%} of their intervals at the wall; they "
-                "are left out of the summary"
+                f"than {in_percent(found.attrs['most_wall_share'])} of their intervals at the "
+                "wall; they are left out of the summary"
             )
         if number["without_fit"]:
             texts = [str(text) for text in part["message"].values.ravel() if text]
@@ -127,13 +128,13 @@ def _doubts(part: xr.Dataset) -> list[str]:
     said = []
     if abs(value["bias"]) > max(NOTABLE_BIAS, NOTABLE_STANDARD_ERRORS * chance):
         said.append(
-            f"C_d is off by {value['bias']:+.0%} on average, where chance gives "
-            f"{chance:.0%}: more recordings do not help, and only a comparison of "
+            f"C_d is off by {in_percent(value['bias'], sign=True)} on average, where chance gives "
+            f"{in_percent(chance)}: more recordings do not help, and only a comparison of "
             "lengths shows whether longer ones do"
         )
     if value["coverage_high"] < part.attrs["confidence"]:
         said.append(
-            f"the {part.attrs['confidence']:.0%} intervals of C_d hold the truth in "
+            f"the {in_percent(part.attrs['confidence'])} intervals of C_d hold the truth in "
             f"{round(value['coverage'] * used)} of {used}: they are too narrow here, by a "
             f"factor of about {value['rms_z']:.1f}"
         )
@@ -162,8 +163,8 @@ def _rows(part: xr.Dataset) -> list[list[str]]:
     for name in RECOVERED:
         value = _summary(part, name)
         covered = (
-            f"{round(value['coverage'] * used)} of {used} ({value['coverage_low']:.0%} to "
-            f"{value['coverage_high']:.0%})"
+            f"{round(value['coverage'] * used)} of {used} ({in_percent(value['coverage_low'])} to "
+            f"{in_percent(value['coverage_high'])})"
             if used
             else "none"
         )
@@ -215,17 +216,18 @@ def _needed_sentence(part: xr.Dataset) -> str:
     if not np.isfinite(scale):
         return f"{head}too few fits to say how the error of C_d falls with the length"
     hour, low, high = (
-        f"{float(part[f'drag_coefficient_error_scale{end}']) / np.sqrt(3600.0):.1%}"
+        in_percent(float(part[f"drag_coefficient_error_scale{end}"]) / np.sqrt(3600.0), decimals=1)
         for end in ("", "_low", "_high")
     )
-    within = f"{part.attrs['needed_confidence']:.0%} interval"
+    within = f"{in_percent(part.attrs['needed_confidence'])} interval"
     text = f"{head}C_d to {hour} (rms) in 1 h ({within} {low} to {high})"
     asked = float(part.attrs["drag_coefficient_precision"])
     if np.isfinite(asked):
         time, low, high = (
             length_text(float(part[f"needed_duration{end}"])) for end in ("", "_low", "_high")
         )
-        text = f"{head}for C_d to {asked:.1%} (rms) record {time} ({within} {low} to {high})"
+        wanted = in_percent(asked, decimals=1)
+        text = f"{head}for C_d to {wanted} (rms) record {time} ({within} {low} to {high})"
     return f"{text}: an estimate from the {_basis(part)}"
 
 
@@ -235,12 +237,12 @@ def model_recovery_answer(found: xr.Dataset) -> Answer:
     lost = float(set_up["missing_share"])
     columns = [
         *("parameter", "truth", "median |error|", "determined in"),
-        f"{set_up['confidence']:.0%} intervals that hold the truth",
+        f"{in_percent(set_up['confidence'])} intervals that hold the truth",
     ]
     parts: list[Part] = [
         f"{set_up['model']}: {found.sizes['recording']} recordings of "
         f"{length_text(float(set_up['duration_s']))} at {float(set_up['sample_rate_Hz']):g} Hz"
-        f"{f', {lost:.0%} of the samples missing' if lost else ''}, tracking noise "
+        f"{f', {in_percent(lost)} of the samples missing' if lost else ''}, tracking noise "
         f"{1e3 * float(set_up['position_noise_m']):.3g} mm"
         f"{', which is known' if set_up['noise'] == 'known' else ''}",
         Table([_model_row(one) for one in each(found, "parameter")], columns),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each
 from driftwalk.schema.kinds.sensitivity import axis_number
 from driftwalk.schema.shapes import short_class
@@ -175,14 +176,15 @@ def _distances(l1: dict[str, Any], smallest: dict[str, Any] | None) -> list[Part
     return [
         f"l1 distance to the reference: {l1['min']:.4f} to {l1['max']:.4f}, median "
         f"{l1['median']:.4f}; by chance {l1['noise_floor_mean']:.4f} (95 %: "
-        f"{l1['noise_floor_95']:.4f}), which {l1['share_above_floor']:.0%} of the settings exceed",
+        f"{l1['noise_floor_95']:.4f}), which {in_percent(l1['share_above_floor'])} of the settings "
+        "exceed",
         f"smallest: {smallest['l1_distance']:.4f} at {place}",
     ]
 
 
 def _variance(components: xr.Dataset, aligned: Mapping[str, float] | None) -> str:
     ratio = components["explained_variance_ratio"].values
-    shares = ", ".join(f"{share:.1%}" for share in ratio[:LISTED_COMPONENTS])
+    shares = ", ".join(in_percent(share, decimals=1) for share in ratio[:LISTED_COMPONENTS])
     more = ", ..." if ratio.size > LISTED_COMPONENTS else ""
     text = f"principal components: {shares}{more} of the variance"
     if aligned is None or not isfinite(aligned["complete_correlation"]):
@@ -199,7 +201,7 @@ def _index_table(sobol: xr.Dataset) -> list[Part]:
     rows = [
         [
             str(one["output"].values),
-            f"{float(one['noise_share']):.1%}",
+            in_percent(float(one["noise_share"]), decimals=1),
             *(f"{v:.2f}" if isfinite(v) else "" for key in orders for v in one[key].values),
         ]
         for one in each(sobol, "output")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.parts import Part, Table, by_name
 from driftwalk.schema.shapes import short_class
 
@@ -33,7 +34,7 @@ def steady_parts(steady: xr.Dataset) -> list[Part]:
         A `steady_state`.
     """
     facts = steady.attrs
-    interval = f"{facts['confidence']:.0%} interval"
+    interval = f"{in_percent(facts['confidence'])} interval"
     heads = [head for head, _ in COLUMNS.values()]
     title = f"bonds break at {_law(facts)}; shares of time from {facts['from_s']:.4g} s on"
     columns = ["class", *(column for head in heads for column in (head, interval))]
@@ -74,7 +75,7 @@ def interval_text(low: float, high: float) -> str:
 def steady_words(steady: xr.Dataset) -> str:
     """Return whether the shares of time are steady, with the false-alarm rate of the test."""
     facts = steady.attrs
-    alarms = f"{facts['false_alarms']:.0%} false alarms"
+    alarms = f"{in_percent(facts['false_alarms'])} false alarms"
     if facts["steady"] == "yes":
         return (
             "steady state: the third and the fourth quarter of the runs do not differ "

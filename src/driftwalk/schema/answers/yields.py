@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.parts import Answer, Part, Row, Table
 from driftwalk.schema.answers.sensitivity import key_of
 from driftwalk.schema.kinds.sensitivity import AXES, axis_number
@@ -99,7 +100,7 @@ def yield_words(found: xr.Dataset, at: int) -> str:
     one = found.isel(setting=at)
     return (
         f"{float(one['fresh_yield']):.3f} by {found.attrs['by_s']:g} s   "
-        f"{found.attrs['confidence']:.0%} interval {float(one['fresh_yield_low']):.3f} to "
+        f"{in_percent(found.attrs['confidence'])} interval {float(one['fresh_yield_low']):.3f} to "
         f"{float(one['fresh_yield_high']):.3f}   {int(one['fresh_runs'])} fresh runs"
     )
 
@@ -109,7 +110,7 @@ def standing_sentences(found: xr.Dataset) -> list[str]:
     alike = np.flatnonzero(found["standing"].values == "alike")
     facts = found.attrs
     if not alike.size:
-        return [f"every other setting is worse, with {facts['confidence']:.0%} confidence"]
+        return [f"every other setting is worse, with {in_percent(facts['confidence'])} confidence"]
     first = f"these {alike.size + 1} cannot be distinguished within {100 * facts['within']:.2g} %: "
     order = alike[np.argsort(-(found["reached"] / found["runs"]).values[alike], kind="stable")]
     named = "; ".join(setting_words(found, int(at)) for at in (facts["best"], *order[:NAMED]))
@@ -171,7 +172,7 @@ def setting_table(found: xr.Dataset) -> Table:
                 else str(one["standing"].values),
             ]
         )
-    share_words = f"{found.attrs['confidence']:.0%} interval"
+    share_words = f"{in_percent(found.attrs['confidence'])} interval"
     columns = ["setting", "yield", share_words, "share in the choosing runs", "runs", "standing"]
     left = len(order) - LISTED
     title = f"the best {LISTED} of {len(order)} settings" if left > 0 else ""
@@ -193,7 +194,7 @@ def front_table(found: xr.Dataset) -> Table:
         ]
         for at in tenths
     ]
-    share_words = f"{found.attrs['confidence']:.0%} interval"
+    share_words = f"{in_percent(found.attrs['confidence'])} interval"
     return Table(rows, ["time (s)", "yield", share_words, "setting"], "front of yield and time")
 
 

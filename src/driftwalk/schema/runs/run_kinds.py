@@ -383,7 +383,7 @@ def answer_of(found: xr.Dataset, **more: Any) -> Answer | None:
     >>> values["interval"] = (("parameter", "bound"), [[0.38, 0.42]])
     >>> answer = answer_of(xr.Dataset(values, names, {"kind": "fit"}))
     >>> lines_of(answer.parts)[0]
-    'drag coefficient C_d   0.4000   90% interval 0.3800 to 0.4200'
+    'drag coefficient C_d   0.4000   90 % interval 0.3800 to 0.4200'
     """
     kind = kind_of(found)
     if kind is None or kind.answer is None:

@@ -13,6 +13,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
+from driftwalk.core.units import in_percent
 from driftwalk.track.detect.markers import (
     ChromaTables,
     MarkerColour,
@@ -78,7 +79,8 @@ class ColourSeen:
     def __str__(self) -> str:
         """Return the colour with its numbers."""
         a, b = self.colour.a_star, self.colour.b_star
-        return f"{self.name} (a* {a:.0f}, b* {b:.0f}; {self.share:.2%} of the image)"
+        share = in_percent(self.share, decimals=2)
+        return f"{self.name} (a* {a:.0f}, b* {b:.0f}; {share} of the image)"
 
 
 @dataclass(frozen=True, eq=False)

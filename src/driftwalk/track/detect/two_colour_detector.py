@@ -9,6 +9,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.extras import require_opencv
+from driftwalk.core.units import in_percent
 from driftwalk.track.detect.markers import ChromaTables, TwoColourMarker
 from driftwalk.track.detect.two_colour_centres import (
     CENTRES,
@@ -111,7 +112,7 @@ class TwoColourDetector:
             else:
                 column, row = result.centres.mean(axis=0)
                 area = pair.first.area + pair.second.area
-                reason = f"only {result.visible:.0%} of the marker can be seen"
+                reason = f"only {in_percent(result.visible)} of the marker can be seen"
                 rejected.append(Rejected(float(column), float(row), area, reason, "hidden"))
         return self._place(measured), rejected
 

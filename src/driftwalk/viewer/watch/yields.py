@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from driftwalk.assembly import proportion_interval
+from driftwalk.core.units import in_percent
 from driftwalk.page.parts import empty_section, table_section
 from driftwalk.schema.answers.yields import LISTED, point_words
 from driftwalk.viewer.watch.run_page import Running, Section
@@ -61,5 +62,5 @@ class RunningYield(Running):
             ends = f"{float(low):.3f} to {float(high):.3f}"
             rows.append([words, f"{k / n:.3f}", ends, n])
         title = "Fresh runs" if fresh else "Settings so far"
-        columns = ["setting", "yield", f"{self._confidence:.0%} interval", "runs"]
+        columns = ["setting", "yield", f"{in_percent(self._confidence)} interval", "runs"]
         return table_section("fresh" if fresh else "chosen", title, columns, rows)

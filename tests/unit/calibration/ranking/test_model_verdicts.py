@@ -222,7 +222,7 @@ def test_a_body_that_is_always_at_the_wall_tells_no_law() -> None:
             ["active"], {0: TYPICAL}, scores=[scored(held=held)], recorded=always
         )
         assert found.word == CANNOT_TELL
-        assert found.reasons[0].startswith("the body was at the wall for 99.4% of the time")
+        assert found.reasons[0].startswith("the body was at the wall for 99.4 % of the time")
 
 
 def test_a_model_at_the_end_of_its_range_is_left_open(monkeypatch: pytest.MonkeyPatch) -> None:

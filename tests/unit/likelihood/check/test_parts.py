@@ -402,7 +402,9 @@ def test_a_change_of_the_flow_that_is_sure_but_small_is_a_note(largest: float) -
     assert found.p_value == pytest.approx(chi2.sf((largest / 5e-4) ** 2, 9))
     small = largest < 0.02
     assert found.failed is not small
-    said = "too small to change the verdict: the strength of the flow differs by 0.4%, up to 2% is"
+    said = (
+        "too small to change the verdict: the strength of the flow differs by 0.4 %, up to 2 % is"
+    )
     assert (found.note or "").startswith(said) is small
     assert "between 180 s and 240 s it is" in found.sentence
 

@@ -86,11 +86,11 @@ def test_a_sound_fit_explains() -> None:
 @pytest.mark.parametrize(
     ("facts", "why"),
     [
-        ({"measured": 100}, "over 4% of the tank, 4.0 times its own area"),
-        ({"wall_share": 0.64}, "64% of the intervals are at the wall"),
+        ({"measured": 100}, "over 4 % of the tank, 4.0 times its own area"),
+        ({"wall_share": 0.64}, "64 % of the intervals are at the wall"),
         (
             {"wall_share": 0.3, "drag_coefficient_relative_std": 0.03},
-            "at the wall for 30% of the time, and C_d is known to 3.0% only",
+            "at the wall for 30 % of the time, and C_d is known to 3.0 % only",
         ),
         ({"restricted": False}, "the restricted likelihood has no minimum"),
         (

@@ -49,7 +49,7 @@ def objection(alone: Mode | None, *, left_out: float = 0.6, flows: int = 2) -> s
 
 def test_a_power_that_the_contacts_feign_is_not_opened() -> None:
     """Without them it is 2 within its error; or other than it was; or not to be had."""
-    assert "2.47 ± 0.02 was not opened: in the 40% of the intervals" in objection(
+    assert "2.47 ± 0.02 was not opened: in the 40 % of the intervals" in objection(
         mode((2.05, 0.05))
     )
     assert "it is 2.8 ± 0.03" in objection(mode((2.8, 0.03)))

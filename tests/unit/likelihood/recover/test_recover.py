@@ -185,7 +185,7 @@ def test_a_simulation_that_breaks_is_data(
         ({"observation.position_noise_m": "estimate"}, r"lacks \[observation\] position_noise_m"),
         ({"observation.orientation_noise_rad": "estimate"}, "lacks .* orientation_noise_rad"),
         ({"recover.durations_s": [5.0]}, "about 51 positions; the fit needs 100"),
-        ({"recover.durations_s": [20.0], "recover.missing_share": 0.5}, "50% of them missing"),
+        ({"recover.durations_s": [20.0], "recover.missing_share": 0.5}, "50 % of them missing"),
         ({"tank.diameter_m": 0.5}, "does not cover the tank"),
     ],
 )

@@ -87,10 +87,10 @@ def test_numbers_are_in_the_units_of_a_reader() -> None:
     facts |= {f"{key}_interval": [end * facts[key] for end in ends] for key in list(facts)}
     facts["pulse_frequency_Hz_interval"] = [0.099935, 0.099955]
     assert texts(facts) == [
-        "memory of the force 0.1000 s   90% interval 0.09000 to 0.1100",
-        "orientation offset 5.000°   90% interval 4.500 to 5.500",
-        "marker off by, x 3.000 mm   90% interval 2.700 to 3.300",
-        "frequency of pulses 0.099945 Hz   90% interval 0.099935 to 0.099955",
+        "memory of the force 0.1000 s   90 % interval 0.09000 to 0.1100",
+        "orientation offset 5.000°   90 % interval 4.500 to 5.500",
+        "marker off by, x 3.000 mm   90 % interval 2.700 to 3.300",
+        "frequency of pulses 0.099945 Hz   90 % interval 0.099935 to 0.099955",
     ]
 
 
@@ -98,8 +98,8 @@ def test_an_open_interval_and_no_interval_are_said() -> None:
     wall = {"wall_contacts": 60, "wall_restitution": 0.5, "wall_friction": 1.2}
     wall |= {"wall_restitution_interval": [0.42, 0.58], "wall_friction_interval": [0.9, np.inf]}
     assert [one.text for one in wall_estimates(fit_of(wall))] == [
-        "0.5000   90% interval 0.4200 to 0.5800",
-        "1.200   90% interval 0.9000 or more",
+        "0.5000   90 % interval 0.4200 to 0.5800",
+        "1.200   90 % interval 0.9000 or more",
     ]
     assert wall_estimates(fit_of({"wall_contacts": 3})) == []
     assert texts({"drag_power": 1.5, "drag_power_interval": [1.5, 1.5]}) == [
