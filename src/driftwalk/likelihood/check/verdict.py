@@ -122,8 +122,8 @@ def _too_often_at_wall(share: float, drag_std: float) -> Iterator[str]:
     if INFORMATION.wall_share_in_doubt < share <= INFORMATION.most_wall_share and drag_std > limit:
         yield (
             f"the block was at the wall for {in_percent(share)} of the time, and C_d is known to "
-            f"{in_percent(drag_std, decimals=1)} only: what is left between the contacts may mislead; record for "
-            "longer, or where the block stays away from the wall"
+            f"{in_percent(drag_std, decimals=1)} only: what is left between the contacts may "
+            "mislead; record for longer, or where the block stays away from the wall"
         )
 
 

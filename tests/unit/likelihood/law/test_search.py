@@ -29,6 +29,7 @@ from driftwalk.schema.answers.facts import facts_of, fitted_value
 from driftwalk.schema.check import check_dataset
 
 SECONDS = 300.0
+SLIGHT = "a power of the drag of 2.14 ± 0.021 would fit better"
 FALSE_ALARM = "an interval of 99.9 % misses once in a thousand; seeds are fixed"
 
 
@@ -60,6 +61,15 @@ def test_the_power_of_the_drag_is_found() -> None:
     forces = estimated_study(fit).forces
     assert forces.drag_power == fitted_value(fit, "drag_power")
     assert forces.drag_speed_m_s == 0.03
+
+
+@pytest.mark.slow
+def test_a_slight_power_of_the_drag_widens_the_interval() -> None:
+    """The power is 2.12, below the least effect of 0.15; the paper's law alone misses C_d."""
+    fit = dw.fit_motion(driven(7, 600.0, {"forces.drag_power": 2.12}), coarse_study("auto"))
+    assert not fit["number_opened"].values.any()
+    assert within(fit, "drag_coefficient", 0.45)
+    assert [text for text in map(str, fit["warning"].values) if SLIGHT in text]
 
 
 def test_the_interval_of_the_quadratic_part_knows_its_share() -> None:
@@ -174,6 +184,7 @@ def test_the_model_itself_opens_nothing() -> None:
     fit = dw.fit_motion(recording(SECONDS), study_with())
     assert fit.attrs["force_law"] == "paper"
     assert not fit["number_opened"].values.any()
+    assert not [text for text in map(str, fit["warning"].values) if "slight" in text]
     assert list(fit["law"].values) == ["paper"]
     assert {"linear_share", "force_memory", "marker_x"} <= set(fit["departure"].values)
 
