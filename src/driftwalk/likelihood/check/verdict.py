@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import isnan
+from math import inf, isnan
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from driftwalk.core.units import in_percent
@@ -118,8 +118,8 @@ def _too_little_seen(fit: xr.Dataset, *, side_m: float) -> Iterator[str]:
 
 def _too_often_at_wall(share: float, drag_std: float) -> Iterator[str]:
     """Say where C_d is not known well enough for so many contacts."""
-    limit = INFORMATION.most_drag_std_at_wall
-    if INFORMATION.wall_share_in_doubt < share <= INFORMATION.most_wall_share and drag_std > limit:
+    often = INFORMATION.wall_share_in_doubt < share <= INFORMATION.most_wall_share
+    if often and INFORMATION.most_drag_std_at_wall < drag_std < inf:
         yield (
             f"the block was at the wall for {in_percent(share)} of the time, and C_d is known to "
             f"{in_percent(drag_std, decimals=1)} only: what is left between the contacts may "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -21,8 +21,10 @@ from driftwalk.likelihood import compare_laws
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interval_inflation import _log_drag_std
 from driftwalk.likelihood.law.force_law import assumptions_of
+from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.held_out import LAWS
 from driftwalk.likelihood.law.search import LawSearch
+from driftwalk.likelihood.newton import Mode
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import build_flow_field, build_trajectory
 from driftwalk.schema.answers.facts import facts_of, fitted_value
@@ -154,6 +156,36 @@ def test_a_small_orbit_is_one_of_a_side(radius: float, small: bool) -> None:
     passes: Any = SimpleNamespace(series=[series], flows=1, body=SimpleNamespace(side=0.03))
     laws.search = SimpleNamespace(passes=passes)  # type: ignore[assignment]
     assert laws._stays_on_a_small_orbit() is small
+
+
+@pytest.mark.parametrize(
+    ("floating", "orientation", "settled_by", "unsettled"),
+    [
+        (True, "none", 28.0, True),
+        (True, "none", 67.0, False),
+        (False, "none", 28.0, False),
+        (True, "state", 28.0, False),
+        (True, "state", 2.0, True),
+    ],
+)
+def test_without_orientations_a_floating_body_needs_more_evidence(
+    monkeypatch: pytest.MonkeyPatch,
+    floating: bool,
+    orientation: str,
+    settled_by: float,
+    unsettled: bool,
+) -> None:
+    """Discs that did not float had up to 28 for it, those that did 67 and more."""
+    mode, other = cast("Mode", object()), cast("Mode", object())
+    laws = object.__new__(LawSearch)
+    body = SimpleNamespace(orientation=orientation)
+    laws.search = SimpleNamespace(passes=SimpleNamespace(body=body))  # type: ignore[assignment]
+    laws.assumptions = SimpleNamespace(pressure_gradient="auto")  # type: ignore[assignment]
+    monkeypatch.setattr(LawSearch, "_other_law", lambda *_: other)
+    found = LawResult(mode, mode, floating, {}, settled_by, None)
+    law = laws._with_rival(found, cast("Point", None))
+    assert bool(law.unsettled) is unsettled
+    assert law.rivals == ((other,) if unsettled else ())
 
 
 @pytest.mark.slow
