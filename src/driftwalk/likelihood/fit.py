@@ -296,7 +296,8 @@ def _laws_of(
         if mode is not None and mode.converged:
             known = tuple(one for one in rivals if one is not None and one.converged)
             base = mode if law.base is law.mode else law.base
-            return laws, replace(law, mode=mode, base=base, rivals=known)
+            noted = law.noted if len(known) == len(rivals) else ()
+            return laws, replace(law, mode=mode, base=base, rivals=known, noted=noted)
     laws = LawSearch(search, assumptions, ready.undisturbed)
     return laws, laws.find(start, weights)
 

@@ -318,9 +318,8 @@ class LawSearch:
         if mode is None:
             return found
         why = (
-            f"{number_sentence(mode, name)} would fit better, but it is so slight that the errors "
-            "of the filter may feign it: it was not opened, and the intervals of C_d and σ_F hold "
-            "those with it too"
+            f"{number_sentence(mode, name)} would fit better, but errors of the filter may feign "
+            "it: it was not opened, and the intervals of C_d and σ_F hold those with it too"
         )
         return replace(found, rivals=(*found.rivals, mode), noted=(*found.noted, why))
 
