@@ -190,7 +190,7 @@ def test_what_a_fit_cannot_take_is_refused_with_the_way() -> None:
             u = u + 0.01 * math.sin((k + 1) * 0.3 * time) * np.sin((k + 1) * 20.0 * y)
         return u, v
 
-    with pytest.raises(InputError, match=r"in 7 modes, and the fit takes 5: the next one is \d+%"):
+    with pytest.raises(InputError, match=r"in 7 modes, and the fit takes 5: the next one is \d+ %"):
         read(frames_of(restless, time))
     study = coarse_study()
     many = [recording(50.0), recording(50.0, "second")]

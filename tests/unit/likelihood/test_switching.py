@@ -22,6 +22,7 @@ from switching_worlds import (
 
 import driftwalk as dw
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.units import in_percent
 from driftwalk.flow import bilinear
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
@@ -425,7 +426,7 @@ def test_a_region_never_visited_is_filled_and_warned_of() -> None:
     assert (found["flag"].values[inside & (radius > 0.09)] == 2).all()
     assert np.isnan(dw.fitted_flow(found)["u_standard_error"].values[~measured]).all()
     warnings = facts_of(found)["warnings"]
-    assert any(f"over {share:.0%} of the tank only" in one for one in warnings)
+    assert any(f"over {in_percent(share)} of the tank only" in one for one in warnings)
 
 
 @pytest.mark.slow
