@@ -1,6 +1,6 @@
 """Held-out test of the kinetics: 2000 runs to fit, 2000 others to test, in twelve settings.
 
-    python studies/kinetics/run.py results.json        (some 15 minutes on two cores)
+    python studies/kinetics/run.py results.json        (some 10 minutes)
 
 Each setting is (factor on the bundled flow, sigma_F in mN), C_d 0.45, 4 blocks, 300 s, latching by
 collision, hidden faces free. For each candidate model: l1 distance of the predicted shares to those
