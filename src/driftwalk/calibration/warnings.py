@@ -60,8 +60,8 @@ def wall_warning(track: Track, study: Study) -> str | None:
         return None
     return (
         f"the block may touch the wall in {in_percent(share)} of the samples, and the study takes "
-        "the "
-        f"default wall (restitution {tank.wall_restitution:g}, friction {tank.wall_friction:g}): a "
+        f"the default wall (restitution {tank.wall_restitution:g}, friction "
+        f"{tank.wall_friction:g}): a "
         "wrong friction can move C_d by a third; the likelihood fit estimates both from the "
         "contacts (`estimate_wall`): state them (`tank.wall_restitution`, `tank.wall_friction`)"
     )

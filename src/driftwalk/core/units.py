@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from driftwalk.core.errors import ConfigurationError
 
@@ -201,6 +201,17 @@ def _expected(unit: str) -> str:
         return "a number"
     example = f" such as '{_EXAMPLES[unit]}'" if unit in _EXAMPLES else ""
     return f"a number in {unit} or a quantity{example}"
+
+
+def percent(share: Any) -> str:
+    """Return a share as a percentage with three digits at most.
+
+    Examples
+    --------
+    >>> percent(0.954), percent(0.95), percent(0.0025)
+    ('95.4 %', '95 %', '0.25 %')
+    """
+    return f"{100.0 * float(share):.3g} %"
 
 
 def in_percent(share: float, *, decimals: int = 0, sign: bool = False) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import percent
 from driftwalk.figures.calibration import trajectory_figure
 from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.flow_field import plot_flow, top_speed
@@ -22,7 +23,6 @@ from driftwalk.plot.model_check import (
 )
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
-from driftwalk.plot.parts.assembly_labels import percent
 from driftwalk.plot.parts.labels import in_unit
 from driftwalk.schema import FLAGS
 from driftwalk.schema.answers.force_law import compared_laws, shared_lengths

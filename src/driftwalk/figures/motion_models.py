@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.units import raised_powers
+from driftwalk.core.units import percent, raised_powers
 from driftwalk.figures.write import Figures
 from driftwalk.plot.model_check import label_checks, plot_check_ratios, plot_own_aspects
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import percent
 from driftwalk.plot.parts.labels import model_words
 from driftwalk.schema.answers.model_comparison import own_score
 from driftwalk.schema.answers.parts import each

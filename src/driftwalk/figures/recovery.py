@@ -9,9 +9,9 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import percent
 from driftwalk.figures.write import Figures
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import percent
 from driftwalk.plot.parts.labels import logarithmic
 from driftwalk.schema.check import require_kind
 

@@ -441,10 +441,9 @@ def agreement_tests(facts: Mapping[str, Any]) -> list[Agreement]:
                 "measured scale",
                 facts["measured_flow_scale_p_value"],
                 f"the measured flow is {in_percent(abs(off))} too "
-                f"{'fast' if off > 0.0 else 'slow'} for "
-                f"the motion (± {in_percent(facts['measured_flow_scale_std'], decimals=1)}): are "
-                "its length scale and "
-                "frame interval right?",
+                f"{'fast' if off > 0.0 else 'slow'} for the motion "
+                f"(± {in_percent(facts['measured_flow_scale_std'], decimals=1)}): are its length "
+                "scale and frame interval right?",
                 facts["measured_flow_scale_detectable"],
             )
         )

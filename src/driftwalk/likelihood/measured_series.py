@@ -169,8 +169,7 @@ def _principal(off: Floats, mean: Floats) -> Floats:
         raise InputError(
             f"the measured flow changes in time in {len(shares)} modes, and the fit takes "
             f"{SERIES.most_modes}: the next one is {in_percent(shares[SERIES.most_modes])} of the "
-            "flow; "
-            "fit a part of the time in which it changes less"
+            "flow; fit a part of the time in which it changes less"
         )
     largest = vectors[:, ::-1][:, : min(len(shares), SERIES.most_modes)]
     found = (largest if wide else changes @ largest).T

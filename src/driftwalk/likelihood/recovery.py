@@ -74,9 +74,8 @@ def require_length(study: Study) -> None:
         raise InputError(
             f"[recover] durations_s: {shortest:g} s at a sample every "
             f"{settings.sample_interval_s:g} s, {in_percent(settings.missing_share)} of them "
-            "missing, are "
-            f"about {samples * retained:.0f} positions; the fit needs {LIMIT.fewest_samples} at "
-            "least, and some minutes to be of use"
+            f"missing, are about {samples * retained:.0f} positions; the fit needs "
+            f"{LIMIT.fewest_samples} at least, and some minutes to be of use"
         )
 
 

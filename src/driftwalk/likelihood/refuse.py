@@ -284,9 +284,8 @@ def reason_of_no_solution(wall_share: float, tracks: Sequence[Track], study: Stu
     if wall_share > LIMIT.most_wall_share:
         return (
             f"{in_percent(wall_share)} of the intervals are at the wall and were left out, and the "
-            "motion "
-            "in the others does not follow the model; record where the body stays away from the "
-            "wall, or check the tank, the side of the block and the units"
+            "motion in the others does not follow the model; record where the body stays away from "
+            "the wall, or check the tank, the side of the block and the units"
         )
     return (
         "the motion does not follow the model at all, or the tank, the block or the units are wrong"

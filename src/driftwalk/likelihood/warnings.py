@@ -189,8 +189,7 @@ def _on_the_data(
             name = "" if intervals.steady else f"in {intervals.describe_flow(flow)} "
             yield (
                 f"{name}the block has been over {in_percent(share)} of the tank only: elsewhere "
-                "the flow "
-                "is continued smoothly and not measured (flag filled)"
+                "the flow is continued smoothly and not measured (flag filled)"
             )
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError, InputError
 from driftwalk.core.text.json_text import json_value
-from driftwalk.core.units import RAISED, raised_powers
+from driftwalk.core.units import RAISED, percent, raised_powers
 from driftwalk.page.arrays import number, numbers
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.schema.answers.facts import facts_of, sentences, source_warnings
@@ -65,17 +65,6 @@ def quantity(value: float, unit: str = "1", *, digits: int = 4) -> str:
     power = 3 * math.floor(math.log10(abs(value)) / 3.0 + 1e-12)
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
     return f"{_digits(value / 10.0**power, digits)} {_PREFIXES[power]}{unit}"
-
-
-def percent(share: float) -> str:
-    """Return a share as a percentage.
-
-    Examples
-    --------
-    >>> percent(0.9), percent(0.0025)
-    ('90 %', '0.25 %')
-    """
-    return f"{100.0 * share:.3g} %"
 
 
 def count(number: int, word: str) -> str:

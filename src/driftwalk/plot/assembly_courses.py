@@ -9,6 +9,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import percent
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import (
     OTHER,
@@ -17,7 +18,6 @@ from driftwalk.plot.parts.assembly_labels import (
     class_names,
     classes_to_show,
     is_complete,
-    percent,
     runs_text,
     with_rest,
 )
@@ -145,22 +145,20 @@ def plot_attraction(attraction: xr.Dataset, ax: Axes | None = None) -> Axes:
     check_kind(attraction, "attraction", "gap", "force", "simulated_force")
     ax = style.axes_or_new(ax, height_mm=65.0)
     gap = 1e3 * np.asarray(attraction["gap"].values, dtype=np.float64)
-    lowest = np.inf
     for name, text, color, dashes in (
         ("force", "as stated", style.BLUE, "-"),
         ("simulated_force", "in the simulation", style.ORANGE, (0, (5, 2))),
     ):
         force = 1e3 * np.asarray(attraction[name].values, dtype=np.float64)
         ax.plot(gap, np.where(force > 0.0, force, np.nan), color=color, ls=dashes, label=text)
-        if name == "force":
-            lowest = force[force > 0.0].min(initial=lowest)
     ax.set(
         xlabel="gap between the faces (mm)", ylabel="attraction (mN)", yscale="log",
         xlim=(0.0, gap[-1]),
     )  # fmt: skip
-    if np.isfinite(lowest):
+    stated = 1e3 * np.asarray(attraction["force"].values, dtype=np.float64)
+    if (stated > 0.0).any():
         # That of the simulation goes to 0 at the end of its reach.
-        ax.set_ylim(bottom=0.5 * lowest)
+        ax.set_ylim(bottom=0.5 * stated[stated > 0.0].min())
     ax.spines[["top", "right"]].set_visible(False)
     ax.legend(frameon=False)
     ax.set_title(fill(str(attraction.attrs["between"]), 56), loc="left")

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from driftwalk.core.units import percent
 from driftwalk.plot.assembly_courses import TIME_LABEL
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind, percent
+from driftwalk.plot.parts.assembly_labels import check_kind
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:

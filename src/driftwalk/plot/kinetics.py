@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats
+from driftwalk.core.units import percent
 from driftwalk.plot.assembly_courses import TIME_LABEL, label_right
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind, class_colors, class_names, percent
+from driftwalk.plot.parts.assembly_labels import check_kind, class_colors, class_names
 from driftwalk.plot.parts.polyomino_sketch import (
     are_discs,
     class_cells,

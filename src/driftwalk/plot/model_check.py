@@ -8,9 +8,9 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import percent
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
-from driftwalk.plot.parts.assembly_labels import percent
 from driftwalk.plot.parts.labels import ANGLE_LABEL, LENGTH_LABEL, in_unit, logarithmic
 from driftwalk.schema.answers.fit import residuals_of
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_LABELS

@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import percent
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import (
     OTHER,
@@ -15,7 +16,6 @@ from driftwalk.plot.parts.assembly_labels import (
     class_names,
     classes_to_show,
     is_complete,
-    percent,
     runs_text,
     with_rest,
 )
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BAR_WIDTH = 0.76
-# Width of axes in one column of a page.
+# Width of axes in one column of a page; of its 255 pt the y axis and its label take the rest.
 COLUMN_PT = 210.0
 
 

@@ -203,8 +203,7 @@ def _reasons(
         if side == NO_END:
             found.append(
                 f"cannot tell {words}: its interval is "
-                f"{in_percent((high - low) / policy.confidence)} of "
-                "the one without data"
+                f"{in_percent((high - low) / policy.confidence)} of the one without data"
             )
         elif side != BOTH_ENDS:
             other = "lower" if side == UPPER_END else "upper"

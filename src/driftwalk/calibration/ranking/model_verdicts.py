@@ -100,18 +100,18 @@ def _doubt_equals(
     """Leave open which of several models explains a recording, where they are equally good."""
     if not found[best].explains:
         # One that passes by its further numbers and is no likelier may lack the same.
+        why = (
+            f"{entries[best].model.name} is simpler and as likely, and does not explain it: the "
+            "law may be another one; record for longer"
+        )
         for k in rivals:
             if found[k].explains:
-                found[k] = found[k].and_also(
-                    [],
-                    [
-                        f"{entries[best].model.name} is simpler and as likely, and does not "
-                        "explain it: the law may be another one; record for longer"
-                    ],
-                )
+                found[k] = found[k].and_also([], [why])
         return
     equal = [k for k in as_good if found[k].explains]
-    for k in (best, *equal) if equal else ():
+    if not equal:
+        return
+    for k in (best, *equal):
         others = " and ".join(entries[one].model.name for one in (best, *equal) if one != k)
         found[k] = found[k].and_also(
             [], [f"{others} explains it as well and is as likely: record for longer"]

@@ -199,8 +199,7 @@ def tail_criterion(white: WhitenessTests, components: tuple[str, ...]) -> Criter
         f"the errors of prediction are not normal: excess kurtosis of {components[worst]} "
         f"{white.excess_kurtosis[worst]:+.2f}, expected 0 ± {white.kurtosis_std:.2f} "
         f"({in_percent(white.tail_share[worst], decimals=2)} beyond 3 sd, expected 0.27 %): the "
-        "force comes in bursts, "
-        "or the tracker slips",
+        "force comes in bursts, or the tracker slips",
         detectable_sigmas(0.5 * VERDICT.level / len(components)) * white.kurtosis_std,
     )
 
@@ -221,9 +220,8 @@ def outlier_criterion(errors: Sequence[Innovations], mistakes: int) -> Criterion
         "outliers",
         0.0 if share > VERDICT.most_outliers and outliers > expected else 1.0,
         f"{outliers} of {samples} samples ({in_percent(share, decimals=2)}) are further than 6 sd "
-        "from where they were "
-        f"predicted and were left out, expected {expected or 'none'}: jumps of the tracker, "
-        "contacts, or bursts",
+        f"from where they were predicted and were left out, expected {expected or 'none'}: jumps "
+        "of the tracker, contacts, or bursts",
         # Their number scatters by its root.
         (least + norm.ppf(POWER.share) * math.sqrt(least)) / max(samples, 1),
     )
@@ -334,8 +332,8 @@ def drag_criterion(trend: Trend, edges: Floats) -> Criterion:
         min(1.0, 2.0 * off.size * float(norm.sf(off[worst]))),
         f"one C_d does not serve at all speeds: at {edges[worst]:.3g} to {edges[worst + 1]:.3g} "
         f"m/s past the block it would be {in_percent(trend.change[worst], sign=True)} off, "
-        "expected 0 ± "
-        f"{in_percent(std[worst])}: the drag is not the square law, or not that of a block",
+        f"expected 0 ± {in_percent(std[worst])}: the drag is not the square law, or not that of a "
+        "block",
         detectable_sigmas(0.5 * VERDICT.level / off.size) * float(np.median(std)),
         LARGEST.drag,
     )

@@ -110,9 +110,8 @@ def _too_little_seen(fit: xr.Dataset, *, side_m: float) -> Iterator[str]:
     if share < INFORMATION.least_visited and blocks < INFORMATION.least_blocks:
         yield (
             f"the block has been over {in_percent(share)} of the tank, {blocks:.1f} times its own "
-            "area: "
-            "the flow, and with it C_d, is not known from so little; record it on a wider path, "
-            "with another setting of the pumps"
+            "area: the flow, and with it C_d, is not known from so little; record it on a wider "
+            "path, with another setting of the pumps"
         )
 
 

@@ -89,8 +89,7 @@ class Alternatives:
     def _without(self, alone: Mode | None, name: str, share: float) -> str:
         left = (
             f"the {in_percent(share)} of the intervals that are half a side or more from the wall "
-            "and not "
-            "next to a gap"
+            "and not next to a gap"
         )
         if alone is None or not alone.converged:
             return f"{left} do not determine it"

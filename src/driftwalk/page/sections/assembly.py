@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.core.units import percent
 from driftwalk.page.parts import (
     Section,
     attempt,
@@ -14,7 +15,6 @@ from driftwalk.page.parts import (
     figure_with_ends,
     label,
     mark,
-    percent,
     quantity,
     require,
     required,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.arrays import Floats
+from driftwalk.core.units import percent
 from driftwalk.page.arrays import encode_array, number
 from driftwalk.page.parts import (
     Maker,
@@ -20,7 +21,6 @@ from driftwalk.page.parts import (
     empty_section,
     label,
     mark,
-    percent,
     require,
     section,
     series,

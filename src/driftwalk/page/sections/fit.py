@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import percent
 from driftwalk.page.parts import (
     SIMULATED,
     Section,
@@ -19,7 +20,6 @@ from driftwalk.page.parts import (
     figure,
     is_simulated,
     label,
-    percent,
     quantity,
     sections_of,
     series,

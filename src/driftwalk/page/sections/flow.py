@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import percent
 from driftwalk.page.arrays import encode_array, plain_list
-from driftwalk.page.parts import Section, arena_part, attempt, percent, quantity, require, section
+from driftwalk.page.parts import Section, arena_part, attempt, quantity, require, section
 from driftwalk.schema import FLAGS
 
 if TYPE_CHECKING:

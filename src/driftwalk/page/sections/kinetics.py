@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.core.units import percent
 from driftwalk.page.parts import (
     Maker,
     Section,
     figure,
-    percent,
     quantity,
     require,
     required,

@@ -8,13 +8,13 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import percent
 from driftwalk.page.arrays import binary_step, encode_array, numbers, plain_list
 from driftwalk.page.parts import (
     Section,
     arena_part,
     axis,
     label as chart_label,
-    percent,
     quantity,
     require,
     section,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.arrays import Floats
+from driftwalk.core.units import percent
 from driftwalk.page.arrays import number, numbers
 from driftwalk.page.parts import (
     Section,
@@ -17,7 +18,6 @@ from driftwalk.page.parts import (
     figure,
     figure_with_ends,
     label,
-    percent,
     require,
     section,
     series,

@@ -10,6 +10,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.units import percent
 from driftwalk.page.arrays import binary_step, encode_array, number, plain_list
 from driftwalk.page.parts import (
     SIMULATED,
@@ -19,7 +20,6 @@ from driftwalk.page.parts import (
     count,
     figure,
     is_simulated,
-    percent,
     quantity,
     section,
     summary_section,

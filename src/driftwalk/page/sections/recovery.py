@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.core.units import percent
 from driftwalk.page.arrays import number
 from driftwalk.page.parts import (
     Maker,
@@ -20,7 +21,6 @@ from driftwalk.page.parts import (
     figure,
     label,
     mark,
-    percent,
     quantity,
     require,
     required,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.core.units import in_percent
+from driftwalk.core.units import in_percent, percent
 from driftwalk.page.parts import (
     Maker,
     Section,
@@ -14,7 +14,6 @@ from driftwalk.page.parts import (
     figure,
     label,
     mark,
-    percent,
     require,
     required,
     sections_of,

@@ -162,17 +162,6 @@ def runs_text(dataset: xr.Dataset) -> str:
     return ", ".join(parts)
 
 
-def percent(value: Any) -> str:
-    """Return "95 %" for 0.95.
-
-    Examples
-    --------
-    >>> percent(0.954), percent(0.95)
-    ('95.4 %', '95 %')
-    """
-    return f"{100.0 * float(value):.3g} %"
-
-
 def _word(value: Any) -> str:
     return str(value).replace("_", " ")
 
