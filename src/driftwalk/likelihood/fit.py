@@ -14,7 +14,6 @@ from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.interaction.glued import (
     GLUED,
@@ -73,7 +72,7 @@ from driftwalk.likelihood.refuse import (
 )
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import build_fit, law_facts, visited_shares, whiteness_of
-from driftwalk.likelihood.start import first_point, first_weights
+from driftwalk.likelihood.start import Starts, first_points, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import described
@@ -161,7 +160,11 @@ def fit_motion(
         ready = replace(ready, earlier=earlier_prior(ready, before))
     passes = ready.passes
     spline = passes.spline
-    start = first_point(ready, spline) if before is None else first_glued_point(ready, before)
+    starts = (
+        first_points(ready, spline)
+        if before is None
+        else Starts(*2 * [first_glued_point(ready, before)])
+    )
     assumptions = assumptions_of(
         chosen, ready.angle, recordings=len(ready.tracks), flows=passes.flows
     )
@@ -174,7 +177,7 @@ def fit_motion(
     with solved(reason):
         passed = _work_listener(course, _usual_search(passes))
         search = ModeSearch(passes, ready.prior, chosen.fit.iterations, passed)
-        search, laws, law, modes = _laws_with_modes(search, assumptions, start, ready)
+        search, laws, law, modes = _laws_with_modes(search, assumptions, starts, ready)
         passes = search.passes
         course.begin("drag")
         try:
@@ -196,7 +199,7 @@ def fit_motion(
     turning: dict[str, Any] = {}
     # How the block's spin goes with the water's, where orientations and one flow are.
     if ready.angle != "none" and ready.intervals.steady:
-        mean = start.mean_coefficients
+        mean = starts.paper.mean_coefficients
         turning["spin_correlation"] = spin_correlation(mean, thinned(ready.passes))
     if ready.angle == "state":
         course.begin("angle as given")
@@ -249,16 +252,16 @@ def fit_motion(
 
 
 def _laws_with_modes(
-    search: ModeSearch, assumptions: Assumptions, start: Point, ready: PreparedRecordings
+    search: ModeSearch, assumptions: Assumptions, starts: Starts, ready: PreparedRecordings
 ) -> tuple[ModeSearch, LawSearch, LawResult, FlowModes]:
     """Return the search, that of the law, its result, and the modes of the flow with which."""
     wanted, modes = ready.study.fit.flow_modes, FlowModes()
     known = ready.earlier
     weights = first_weights(ready.tracks, search.passes.spline) if known is None else known.weights
     if wanted != "none":
-        modes = find_flow_modes(search, start, weights, wanted)
+        modes = find_flow_modes(search, starts.paper, weights, wanted)
     if modes.start is None:
-        laws, law = _laws_of(search, assumptions, start, weights, ready)
+        laws, law = _laws_of(search, assumptions, starts, weights, ready)
         if wanted != "none":
             # Under the right law the line may stand out that did not under the paper's.
             modes = modes_at(
@@ -268,14 +271,15 @@ def _laws_with_modes(
             return search, laws, law, modes
     search = with_layers(search, modes.layers)
     assumptions = replace(assumptions, opened={**assumptions.opened, **modes.opened})
-    laws, law = _laws_of(search, assumptions, modes.start, modes.weights or weights, ready)
+    found = Starts(modes.start, modes.start)
+    laws, law = _laws_of(search, assumptions, found, modes.weights or weights, ready)
     return search, laws, law, modes
 
 
 def _laws_of(
     search: ModeSearch,
     assumptions: Assumptions,
-    start: Point,
+    starts: Starts,
     weights: Weights,
     ready: PreparedRecordings,
 ) -> tuple[LawSearch, LawResult]:
@@ -291,7 +295,7 @@ def _laws_of(
             return search.find(mode.point, mode.weights, held=FROM_THINNED)
 
         laws = LawSearch(replace(search, passes=few), assumptions, undisturbed)
-        law = laws.find(start, weights)
+        law = laws.find(starts, weights)
         mode, rivals = of_all(law.mode), [of_all(one) for one in law.rivals]
         if mode is not None and mode.converged:
             known = tuple(one for one in rivals if one is not None and one.converged)
@@ -299,7 +303,7 @@ def _laws_of(
             noted = law.noted if len(known) == len(rivals) else ()
             return laws, replace(law, mode=mode, base=base, rivals=known, noted=noted)
     laws = LawSearch(search, assumptions, ready.undisturbed)
-    return laws, laws.find(start, weights)
+    return laws, laws.find(starts, weights)
 
 
 def _parameter_facts(

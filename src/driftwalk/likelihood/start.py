@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,36 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
+class Starts(NamedTuple):
+    """Where the search begins under each force law."""
+
+    paper: Point
+    floating: Point
+
+
+FLOATING_UNREST: Final = 4.0
+"""The first q of a floating body, over that of the paper's law. TODO"""
+
+
+def first_points(ready: PreparedRecordings, spline: Spline) -> Starts:
+    """Return the first values under each law.
+
+    A floating body follows the water: the push of the water explains what Eq. 4 takes for slip.
+    From the flow of Eq. 4 the search lost the track of bodies on small orbits, or took all of the
+    motion for noise.
+    """
+    from driftwalk.model import apply_overrides
+
+    paper = first_point(ready, spline)
+    tracer = apply_overrides(ready.study, {"flow.inertia": "none"})
+    floating = replace(
+        paper,
+        coefficients=_first_coefficients(ready, tracer, spline),
+        log_intensity=paper.log_intensity + math.log(FLOATING_UNREST),
+    )
+    return Starts(paper, floating)
+
+
 def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
     """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`."""
     study, tracks = ready.study, ready.tracks
@@ -34,25 +64,8 @@ def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
     # The first q is a tenth of U^3 / a, speed U and side a: rather too large than too small, as a
     # small one makes the filter lose the track.
     unrest = 0.1 * typical_speed(tracks) ** 3 / study.block.side_m
-    if ready.intervals.steady:
-        coefficients = _flow_coefficients(tracks[0], study, spline, ready.measured)
-        if ready.measured is not None and ready.measured.layers > 1:
-            normal, right = ready.measured.normal, ready.measured.right
-            modes = [
-                _smooth(normal[k : k + 2].mean(axis=0), right[k : k + 2], spline)
-                for k in range(2, len(normal), 2)
-            ]
-            coefficients = np.stack([coefficients, *modes])
-    else:
-        # Each flow begins with the longest stretch that was recorded in it.
-        longest: dict[int, Track] = {}
-        for (flow, _), part in zip(ready.places, ready.parts, strict=True):
-            if flow not in longest or part.time.size > longest[flow].time.size:
-                longest[flow] = part
-        flows = range(len(ready.intervals.labels))
-        coefficients = np.stack([_flow_coefficients(longest[k], study, spline) for k in flows])
     point = Point(
-        coefficients,
+        _first_coefficients(ready, study, spline),
         log_drag=math.log(PRIOR.drag),
         log_intensity=math.log(unrest),
         log_noise=_log_noise([camera.position_noise for camera in cameras], least),
@@ -67,6 +80,27 @@ def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
         log_lever=math.log(usual_lever(study.block.side_m, study.block.body())),
         log_angle_noise=_log_noise([camera.orientation_noise for camera in cameras], least_angle),
     )
+
+
+def _first_coefficients(ready: PreparedRecordings, study: Study, spline: Spline) -> Floats:
+    """Return the first coefficients of the flow, of each flow, or of its modes."""
+    if ready.intervals.steady:
+        coefficients = _flow_coefficients(ready.tracks[0], study, spline, ready.measured)
+        if ready.measured is None or ready.measured.layers == 1:
+            return coefficients
+        normal, right = ready.measured.normal, ready.measured.right
+        modes = [
+            _smooth(normal[k : k + 2].mean(axis=0), right[k : k + 2], spline)
+            for k in range(2, len(normal), 2)
+        ]
+        return np.stack([coefficients, *modes])
+    # Each flow begins with the longest stretch that was recorded in it.
+    longest: dict[int, Track] = {}
+    for (flow, _), part in zip(ready.places, ready.parts, strict=True):
+        if flow not in longest or part.time.size > longest[flow].time.size:
+            longest[flow] = part
+    flows = range(len(ready.intervals.labels))
+    return np.stack([_flow_coefficients(longest[k], study, spline) for k in flows])
 
 
 def _log_noise(estimates: Sequence[float], least: float) -> float:

@@ -27,6 +27,7 @@ from driftwalk.core.random_streams import CheckStream, world_keys
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.likelihood.check.restarts import (
     Sections,
+    States,
     first_samples,
     sections_of,
     within_sections,
@@ -38,7 +39,6 @@ from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
 from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.spline import Spline
 from driftwalk.schema.answers.facts import fitted_value
-from driftwalk.simulation.initial import Start
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -123,16 +123,39 @@ def problems_of(
     return problems
 
 
-def restarted(problems: Sequence[Problem], estimate: Estimate, *, every: float) -> list[Replicated]:
+def filtered_states(estimate: Estimate) -> list[States]:
+    """Return the states of the filter after each sample, series by series.
+
+    Where the angle is not a part of them, they have that of the recording.
+    """
+    found = []
+    for one, track in zip(estimate.passes.series, estimate.tracks, strict=True):
+        kernel = estimate.passes.kernel(one, estimate.point.in_flow(one.flow))
+        run = kernel.run(one.time.size, errors=True)
+        values, size = run["state"], run["state"].shape[1]
+        mean, covariance = np.zeros((one.time.size, 6)), np.zeros((one.time.size, 6, 6))
+        at = np.arange(6) if size == 6 else np.array([0, 1, 3, 4])
+        mean[:, at] = values
+        covariance[:, at[:, None], at] = run["errors"][:, 2, :size, :size]
+        if size < 6:
+            unused = estimate.passes.body.orientation == "none"
+            mean[:, 2], mean[:, 5] = track.theta if unused else one.angle, one.omega
+        found.append(States(mean, covariance))
+    return found
+
+
+def restarted(
+    problems: Sequence[Problem], estimate: Estimate, states: Sequence[States], *, every: float
+) -> list[Replicated]:
     """Return the series, whose replicates begin again after the time `every` [s]."""
     found = []
-    for problem, track in zip(problems, estimate.tracks, strict=True):
+    for problem, track, known in zip(problems, estimate.tracks, states, strict=True):
         study, first = problem.study, first_samples(track, every)
         found.append(
             Replicated(
                 problem,
                 first,
-                sections_of(track, first, window=study.flow.smoothing_window_s),
+                sections_of(track, first, known, window=study.flow.smoothing_window_s),
                 within_sections(problem.reference.plan, first),
                 outline_of(study.tank.to_arena()),
                 estimate.passes.body.orientation,
@@ -333,7 +356,7 @@ def _poses(
         own = replace(
             like,
             sample_time=some.time,
-            start=Start(*(np.tile(axis, count) for axis in some.start)),
+            start=some.starts(count, int(keys[0, done])),
             flow_start=np.tile(some.begin, count) if "time" in like.flow.dims else None,
         )
         values = {

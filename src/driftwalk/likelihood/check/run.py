@@ -27,6 +27,7 @@ from driftwalk.likelihood.check.posterior_predictive import (
     distances_at_estimate,
 )
 from driftwalk.likelihood.check.replicates import (
+    filtered_states,
     posterior_replicates,
     problems_of,
     recorded_steps,
@@ -240,7 +241,8 @@ def check_model(
     try:
         seen = further_apart(estimate)
         problems = problems_of(fit, seen, many)
-        series = restarted(problems, seen, every=RESTART.steps_s)
+        states = filtered_states(seen)
+        series = restarted(problems, seen, states, every=RESTART.steps_s)
         real, threads = recorded_steps(series, seen), problems[0].like.threads
         near = distances_at_estimate(
             real,
@@ -254,7 +256,7 @@ def check_model(
         free = posterior_replicates(
             fit,
             seen,
-            restarted(problems, seen, every=RESTART.change_s),
+            restarted(problems, seen, states, every=RESTART.change_s),
             found.leverage.spread,
             count=replicates,
             seed=seed,

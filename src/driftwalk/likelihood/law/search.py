@@ -9,7 +9,7 @@ fitted, and closed again where nothing comes of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -31,6 +31,7 @@ from driftwalk.likelihood.newton import (
 )
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.refuse import BREAKDOWN
+from driftwalk.likelihood.start import Starts
 from driftwalk.schema.answers.force_law import LEAST_EVIDENCE, OPENED_SIGMAS
 
 
@@ -58,10 +59,6 @@ class LawPolicy(NamedTuple):
     lever_sigmas: float = 1.64
     """A lever of the force counts when it is above the notable one by this many standard
     deviations: 5 % of the recordings whose lever is just notable."""
-    drag_from_paper: float = 1.0
-    """C_d at which a second search for the other law begins, with the flow and the noises of the
-    paper's: under that the C_d of a floating body on a small orbit was found 50 to 500 times too
-    small. From 0.5 fewer of five such searches came to an end."""
     notable_lever: float = 0.005
     """Lever of the force, in sides of the block, above which the turning does not follow the model.
     On recordings of the model it comes out at 0.001 to 0.004, with angles 5 degrees off at
@@ -99,23 +96,27 @@ class LawSearch:
         self.selection = ForwardSelection(search, assumptions)
         self.alternatives = Alternatives(search, self.selection, undisturbed)
 
-    def find(self, start: Point, weights: Weights) -> LawResult:
+    def find(self, starts: Starts, weights: Weights) -> LawResult:
         """Return the law and the mode that the recording supports."""
-        start = replace(start, opened=self.assumptions.opened, fixed=self.assumptions.fixed)
-        base = self._base(start, weights)
+        known = self.assumptions.fixed
+        starts = Starts(
+            replace(starts.paper, opened=self.assumptions.opened, fixed=known),
+            replace(starts.floating, opened=self.assumptions.opened, fixed={**known, **FLOATING}),
+        )
+        base = self._base(starts, weights)
         found = self._beside(base, "departures from it", lambda: self.selection.select(base))
         if "drag_power" in self.assumptions.tried and self._turns_by_itself(base.mode):
             found = self._beside(
                 found,
                 "another power of the drag",
-                lambda: self._powered(base, found, start, weights),
+                lambda: self._powered(base, found, starts, weights),
             )
-        found = self._beside(found, "the other law", lambda: self._reconsidered(found, start))
+        found = self._beside(found, "the other law", lambda: self._reconsidered(found, starts))
         found = self._beside(found, "other explanations", lambda: self._supported(found))
         found = self._beside(
             found, "a slight power of the drag", lambda: self._with_slight_power(found)
         )
-        return self._beside(found, "the other law", lambda: self._with_rival(found, start))
+        return self._beside(found, "the other law", lambda: self._with_rival(found, starts))
 
     def _beside(self, found: LawResult, what: str, search: Callable[[], LawResult]) -> LawResult:
         """Return what a further search finds; the law found before it where it breaks down."""
@@ -125,26 +126,26 @@ class LawSearch:
             return replace(found, left_out=(*found.left_out, what))
 
     def _powered(
-        self, base: LawResult, found: LawResult, start: Point, weights: Weights
+        self, base: LawResult, found: LawResult, starts: Starts, weights: Weights
     ) -> LawResult:
         """Return the law with another power of the drag where it has more evidence."""
-        powered = self._with_power(base, start, weights)
+        powered = self._with_power(base, starts, weights)
         if powered is not None and self._ahead(powered.mode, found.mode) > LEAST_EVIDENCE:
             return powered
         return found
 
-    def _base(self, start: Point, weights: Weights) -> LawResult:
-        floating = replace(start, fixed={**start.fixed, **FLOATING})
+    def _base(self, starts: Starts, weights: Weights) -> LawResult:
         if self.assumptions.pressure_gradient != "auto":
             on = self.assumptions.pressure_gradient == "on"
-            mode = require_mode(self.search.find_from_afar(floating if on else start, weights))
+            mode = require_mode(
+                self.search.find_from_afar(starts.floating if on else starts.paper, weights)
+            )
             return self._alone(mode, floating=on)
-        paper = self.search.find_from_afar(start, weights)
+        paper = self.search.find_from_afar(starts.paper, weights)
         if paper is not None and paper.converged:
             tests = score_tests(self.search, paper, (*FLOATING, *self.assumptions.tried))
             if tests is not None and not self._is_doubted(tests, paper):
                 return self._undoubted(paper, tests)
-        starts = {"paper": start, "floating": floating}
         if paper is None:
             return self._compared(starts, weights, paper)
         return self._beside(
@@ -195,14 +196,15 @@ class LawSearch:
         settled_by = max(apart, 0.0) if apart < LEAST_EVIDENCE else math.inf
         return replace(self._alone(paper, floating=False), settled_by=settled_by, tests=tests)
 
-    def _compared(
-        self, starts: Mapping[str, Point], weights: Weights, paper: Mode | None
-    ) -> LawResult:
+    def _compared(self, starts: Starts, weights: Weights, paper: Mode | None) -> LawResult:
         """Return the law with the larger evidence in the beginning of the recordings."""
         search = self.search
         series = beginning(search.passes)
         begin = search.of(series)
-        tried = {name: _mode_in(begin, start, weights, paper) for name, start in starts.items()}
+        tried = {
+            "paper": _mode_in(begin, starts.paper, weights, near=paper),
+            "floating": _mode_in(begin, starts.floating, weights),
+        }
         found = {name: mode for name, mode in tried.items() if mode is not None}
         if not found:
             raise np.linalg.LinAlgError("no law has a solution")
@@ -220,7 +222,7 @@ class LawSearch:
                 return LawResult(mode, mode, True, evidence, ahead, None)
         if paper is None:
             near = found.get("paper", next(iter(found.values())))
-            start = replace(near.point, fixed=starts["paper"].fixed)
+            start = replace(near.point, fixed=starts.paper.fixed)
             paper = require_mode(search.find(start, near.weights, held=held))
         # Below zero where the other law has more evidence, but too little, or no solution on all.
         return LawResult(paper, paper, False, evidence, -ahead, None)
@@ -237,7 +239,7 @@ class LawSearch:
         lower = math.exp(value - LAW.lever_sigmas * std)
         return lower > LAW.notable_lever * self.search.passes.body.side
 
-    def _with_power(self, base: LawResult, start: Point, weights: Weights) -> LawResult | None:
+    def _with_power(self, base: LawResult, starts: Starts, weights: Weights) -> LawResult | None:
         """Return the law with another power of the drag, where it explains why the block turns.
 
         A flow that was fitted under the power 2 can take up a drag of another one. Its score test
@@ -245,8 +247,8 @@ class LawSearch:
         otherwise than its drag makes it. So the search begins again. A marker that is off or pulses
         of the flow make the block turn as well: the caller compares the law with them.
         """
-        fixed = {**start.fixed, **(FLOATING if base.floating else {})}
-        point = replace(start, opened={**start.opened, **DRAGS["power"].opened}, fixed=fixed)
+        start = starts.floating if base.floating else starts.paper
+        point = replace(start, opened={**start.opened, **DRAGS["power"].opened})
         mode = self.search.find_from_afar(point, weights)
         if (
             mode is None
@@ -257,7 +259,7 @@ class LawSearch:
             return None
         return self.selection.select(replace(base, mode=mode, tests=None))
 
-    def _reconsidered(self, found: LawResult, start: Point) -> LawResult:
+    def _reconsidered(self, found: LawResult, starts: Starts) -> LawResult:
         """Return the law, or the other one where the departures that were found are in its favour.
 
         The laws were compared before anything was opened. Pulses of the flow, for example, may have
@@ -269,7 +271,7 @@ class LawSearch:
             return found
         if found.settled_by > LAW.decisive_evidence and not self._is_challenged(mode):
             return found
-        rival = self._other_law(found, start)
+        rival = self._other_law(found, starts)
         if rival is None:
             return found
         ahead = self._ahead(rival, mode)
@@ -281,11 +283,12 @@ class LawSearch:
         other = LawResult(rival, rival, not found.floating, evidence, ahead, None)
         return self.selection.select(other)
 
-    def _other_law(self, found: LawResult, start: Point) -> Mode | None:
+    def _other_law(self, found: LawResult, starts: Starts) -> Mode | None:
         """Return the mode of the other law with the same numbers opened; nothing without one."""
         mode = found.mode
         fixed = {name: value for name, value in mode.point.fixed.items() if name not in FLOATING}
         fixed |= {} if found.floating else FLOATING
+        start = starts.paper if found.floating else starts.floating
         point = replace(start, opened=mode.point.opened, fixed=fixed)
         rival = self.search.find_from_afar(point, mode.weights)
         return rival if rival is not None and rival.converged else None
@@ -323,13 +326,13 @@ class LawSearch:
         )
         return replace(found, rivals=(*found.rivals, mode), noted=(*found.noted, why))
 
-    def _with_rival(self, found: LawResult, start: Point) -> LawResult:
+    def _with_rival(self, found: LawResult, starts: Starts) -> LawResult:
         """Return the law, and the other one as well where the recording cannot tell them."""
         blind = found.floating and self.search.passes.body.orientation == "none"
         least = LAW.without_orientation if blind else LEAST_EVIDENCE
         if self.assumptions.pressure_gradient != "auto" or found.settled_by >= least:
             return found
-        rival = self._other_law(found, start)
+        rival = self._other_law(found, starts)
         if rival is None:
             return found
         why = (
@@ -353,8 +356,10 @@ class LawSearch:
         return evidence_of(mode, prior) - evidence_of(other, prior)
 
 
-def _mode_in(begin: ModeSearch, start: Point, weights: Weights, paper: Mode | None) -> Mode | None:
-    """Return the mode of a law in the beginning, by way of the paper's where that leads to it.
+def _mode_in(
+    begin: ModeSearch, start: Point, weights: Weights, *, near: Mode | None = None
+) -> Mode | None:
+    """Return the mode of a law in the beginning, by way of one `near` it where that helps.
 
     Evidences are compared at the maxima: after as many steps as the paper's law takes, the right
     law of a small orbit was still hundreds of nats behind. Where none is reached the first steps
@@ -364,11 +369,8 @@ def _mode_in(begin: ModeSearch, start: Point, weights: Weights, paper: Mode | No
     if few is not None and few.converged:
         return few
     mode = begin.find(start, weights)
-    if (mode is None or not mode.converged) and paper is not None:
-        near = replace(paper.point, opened=start.opened, fixed=start.fixed)
-        if near.fixed != paper.point.fixed:
-            near = replace(near, log_drag=math.log(LAW.drag_from_paper))
-        mode = begin.find(near, paper.weights) or mode
+    if (mode is None or not mode.converged) and near is not None:
+        mode = begin.find(near.point, near.weights) or mode
     if mode is not None and not mode.converged:
         mode = begin.find(mode.point, mode.weights, held=FROM_NEAR)
     return mode if mode is not None and mode.converged else few
