@@ -32,7 +32,8 @@ class Starts(NamedTuple):
 
 
 FLOATING_UNREST: Final = 4.0
-"""The first q of a floating body, over that of the paper's law. TODO"""
+"""The first q of a floating body, over that of the paper's law. Of 28 floating bodies that moved
+(studies/verdict, held-out) the search found all with 4, two not with 1, and two not with 16."""
 
 
 def first_points(ready: PreparedRecordings, spline: Spline) -> Starts:

@@ -155,6 +155,7 @@ private:
       for (int a = 0; a < D; ++a) {
         state_.covariance[a + D][a + D] += unknown_velocity(a) * unknown_velocity(a);
       }
+      state_.restarted = true;
     }
   }
 

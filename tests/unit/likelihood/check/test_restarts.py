@@ -9,6 +9,7 @@ from driftwalk.comparison import StepDistance, apply_steps
 from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.check.restarts import (
     RESTART,
+    States,
     first_samples,
     frames_of,
     sections_of,
@@ -26,6 +27,11 @@ def track_at(time: Floats, *, seed: int = 1) -> Track:
     return Track(time, x, y, 0.1 * time)
 
 
+def unknown(samples: int) -> States:
+    """Return the states of a filter that knows nothing."""
+    return States(np.full((samples, 6), np.nan), np.tile(np.eye(6), (samples, 1, 1)))
+
+
 def regular(minutes: float) -> Floats:
     return 5.0 + 0.1 * np.arange(round(600 * minutes) + 1)
 
@@ -34,7 +40,7 @@ def test_a_regular_recording_begins_again_every_ten_seconds() -> None:
     track = track_at(regular(3.0))
     first = first_samples(track, RESTART.steps_s)
     np.testing.assert_allclose(track.time[first] - 5.0, RESTART.steps_s * np.arange(18), atol=1e-9)
-    (one,) = sections_of(track, first, window=WINDOW_S)
+    (one,) = sections_of(track, first, unknown(track.time.size), window=WINDOW_S)
     np.testing.assert_allclose(one.time, 0.1 * np.arange(101), atol=1e-9)
 
 
@@ -46,7 +52,7 @@ def test_sections_hold_each_sample_at_its_time(dropped: float, jitter: float) ->
     time = time + jitter * generator.uniform(-1.0, 1.0, time.size)
     track = track_at(np.concatenate([time, time[-1] + 7.0 + 0.1 * np.arange(100)]))
     first = first_samples(track, RESTART.steps_s)
-    parts = sections_of(track, first, window=WINDOW_S)
+    parts = sections_of(track, first, unknown(track.time.size), window=WINDOW_S)
     assert len(parts) == (1 if jitter < 1e-3 else first.size)
     samples = np.concatenate([one.sample for one in parts])
     assert np.array_equal(samples, np.arange(track.time.size))
@@ -81,13 +87,36 @@ def test_starts_are_where_the_recording_is_and_how_it_moves() -> None:
     angle = 0.7 * time
     track = Track(time, 0.1 * np.cos(angle), 0.1 * np.sin(angle), angle)
     first = first_samples(track, RESTART.steps_s)
-    for one in sections_of(track, first, window=WINDOW_S):
+    for one in sections_of(track, first, unknown(track.time.size), window=WINDOW_S):
         at = angle[first]
         start = [np.asarray(axis) for axis in one.start]
         np.testing.assert_allclose(start[0], 0.1 * np.cos(at), atol=1e-4)
         np.testing.assert_allclose(start[3], -0.07 * np.sin(at), atol=2e-3)
         np.testing.assert_allclose(start[4], 0.07 * np.cos(at), atol=2e-3)
         np.testing.assert_allclose(start[5], 0.7, atol=1e-6)
+
+
+def test_starts_are_drawn_from_the_states_of_the_filter() -> None:
+    """Means and covariances of 4000 starts, within five standard errors, and an unknown one."""
+    track = track_at(regular(1.0))
+    first = first_samples(track, RESTART.steps_s)
+    generator = np.random.default_rng(5)
+    mean = generator.normal(size=(track.time.size, 6))
+    half = 1e-2 * generator.normal(size=(track.time.size, 6, 6))
+    states = States(mean, half @ half.transpose(0, 2, 1))
+    states.covariance[first[2]] = np.eye(6)
+    (one,) = sections_of(track, first, states, window=WINDOW_S)
+    drawn = np.reshape(one.starts(4000, 7), (6, 4000, first.size))
+    for k, at in enumerate(first):
+        if k == 2:
+            assert np.ptp(drawn[:, :, k], axis=1).max() == 0.0
+            np.testing.assert_allclose(drawn[0, 0, k], track.x[at], atol=4e-3)
+            continue
+        wanted = states.covariance[at]
+        error = np.sqrt(np.diag(wanted) / 4000)
+        assert (np.abs(drawn[:, :, k].mean(axis=1) - mean[at]) < 5.0 * error).all()
+        scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
+        assert np.abs((np.cov(drawn[:, :, k]) - wanted) / scale).max() < 5.0 * np.sqrt(2.0 / 4000)
 
 
 @pytest.mark.parametrize("interval", [0.1, 0.2, 0.25])

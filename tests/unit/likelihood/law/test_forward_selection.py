@@ -18,7 +18,7 @@ from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
 from driftwalk.likelihood.preparation import prepare
 from driftwalk.likelihood.prior import Prior
-from driftwalk.likelihood.start import first_point, first_weights
+from driftwalk.likelihood.start import first_points, first_weights
 
 PULSE = {"pulse_cosine": 0.1, "pulse_sine": 0.0, "pulse_frequency": 0.2}
 
@@ -88,11 +88,11 @@ def test_a_law_that_was_found_amid_departures_is_compared_again(settled_by: floa
     assumptions = assumptions_of(study, ready.angle, recordings=1, flows=1)
     modes = ModeSearch(passes, Prior(passes), study.fit.iterations)
     search = LawSearch(modes, assumptions, ready.undisturbed)
-    start = first_point(ready, passes.spline)
+    starts = first_points(ready, passes.spline)
     weights = first_weights(ready.tracks, passes.spline)
-    afar = replace(start, opened={"linear_share": 0.1}, fixed=dict(FLOATING))
+    afar = replace(starts.paper, opened={"linear_share": 0.1}, fixed=dict(FLOATING))
     wrong = require_mode(search.search.find_from_afar(afar, weights))
-    found = search._reconsidered(LawResult(wrong, wrong, True, {}, settled_by, None), start)
+    found = search._reconsidered(LawResult(wrong, wrong, True, {}, settled_by, None), starts)
     assert not found.floating
     assert not found.mode.point.opened
     assert found.settled_by == found.evidence["paper"] - found.evidence["floating"] > 10.0
