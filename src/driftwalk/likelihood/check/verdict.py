@@ -29,8 +29,9 @@ class InformationPolicy(NamedTuple):
     """
 
     least_visited: float = 0.08
-    """Share of the tank. In two orbits over 4 and 6 % of it C_d came out 41 and 83 % off, and every
-    criterion passed."""
+    """Share of the tank, where the law is not that of a floating body. In two orbits over 4 and 6 %
+    of it C_d came out 41 and 83 % off under the paper's, and every criterion passed. Under the
+    floating body's, C_d was 0 to 9 % off in twelve over 2 to 6 % (held-out set)."""
     least_blocks: float = 5.0
     """Area in blocks: those orbits covered 2.5 and 3.5, and one along half the radius of the usual
     tank covers 10."""
@@ -40,10 +41,10 @@ class InformationPolicy(NamedTuple):
     wall_share_in_doubt: float = 0.2
     """Share of the intervals at the wall from which C_d has to be known well: the force decides
     when the block meets the wall, and so which intervals are left. Chosen with the next one."""
-    most_drag_std_at_wall: float = 0.03
-    """Relative standard deviation of C_d up to which it is known well. Beyond both, the errors of
-    C_d were 2.7 standard deviations (root mean square of ten recordings of studies/verdict that
-    passed all else), in 25 that had it better 0.9."""
+    most_drag_std_at_wall: float = 0.05
+    """Relative standard deviation of C_d up to which it is known well: an error of 10 % is two of
+    them. Beyond both, the errors of C_d were 1.6 of them (root mean square of seven recordings of
+    studies/verdict), in 32 that had it better 1.2."""
     most_lever: float = 1 / 30
     """Lever of the force, in sides of the block. C_d was within 5 % at up to 0.027 of a side and
     more than 85 % off from 0.06 on (development set)."""
@@ -104,6 +105,8 @@ def _without_power(criteria: Sequence[Criterion], drag_std: float) -> Iterator[s
 
 def _too_little_seen(fit: xr.Dataset, *, side_m: float) -> Iterator[str]:
     """Say where the block has been over too little of the tank, in any of the flows."""
+    if fit.attrs["force_law"] == "floating body":
+        return
     share = min(visited_shares(fit))
     inside = fit["flag"].isel(flow=0, missing_dims="ignore") != FLAGS["outside"]
     blocks = share * int(inside.sum()) * (float(fit["cell_size"]) / side_m) ** 2

@@ -87,12 +87,15 @@ class Series:
         its next errors are far smaller than it expects, and places where it often begins, which are
         those at the wall, would seem to have less noise.
         """
-        begins = np.concatenate([[True], self.gaps])
-        begins |= self.excluded != 0
-        settled = ~begins
+        settled = ~self.begins
         for later in range(1, FILTER.settling_samples + 1):
-            settled[later:] &= ~begins[:-later]
+            settled[later:] &= ~self.begins[:-later]
         return settled
+
+    @property
+    def begins(self) -> Bools:
+        """Which samples the filter begins at, with any velocity: the next error counts nowhere."""
+        return np.asarray(np.concatenate([[True], self.gaps]) | (self.excluded != 0))
 
     @property
     def pooled(self) -> int:
@@ -448,11 +451,11 @@ def _reach(block: Block) -> float:
 
 
 def usable_intervals(series: Sequence[Series]) -> int:
-    """Return the number of intervals that are not left out, no gaps, and not next after one."""
+    """Return the number of intervals that count: no gap, not left out, nor next after either."""
     count = 0
     for one in series:
         left_out = one.gaps | (one.excluded[1:] != 0)
-        left_out[1:] |= one.gaps[:-1]
+        left_out[1:] |= left_out[:-1].copy()
         count += int(np.count_nonzero(~left_out))
     return count
 

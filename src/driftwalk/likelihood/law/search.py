@@ -31,7 +31,7 @@ from driftwalk.likelihood.newton import (
 )
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.refuse import BREAKDOWN
-from driftwalk.likelihood.start import Starts
+from driftwalk.likelihood.start import FLOATING_UNREST, Starts
 from driftwalk.schema.answers.force_law import LEAST_EVIDENCE, OPENED_SIGMAS
 
 
@@ -312,9 +312,13 @@ class LawSearch:
         interval of 3 %. So the intervals hold what both laws give.
         """
         tests, name = found.tests, "drag_power"
-        if tests is None or set(DRAG_SHAPES) & set(found.mode.point.opened) or found.unsettled:
+        known = set(DRAG_SHAPES) & set(found.mode.point.opened) or found.unsettled
+        if known or name not in self.assumptions.tried:
             return found
-        if abs(tests.sigmas.get(name, 0.0)) <= LAW.slight_sigmas:
+        if tests is not None and name not in tests.names:
+            # It was opened, and closed again.
+            tests = score_tests(self.search, found.mode, [name])
+        if tests is None or abs(tests.sigmas.get(name, 0.0)) <= LAW.slight_sigmas:
             return found
         value = NUMBERS[name].model + tests.of(name)[0]
         mode = self.selection.opened(found.mode, name, value)
@@ -369,8 +373,17 @@ def _mode_in(
     if few is not None and few.converged:
         return few
     mode = begin.find(start, weights)
-    if (mode is None or not mode.converged) and near is not None:
-        mode = begin.find(near.point, near.weights) or mode
+    if near is not None:
+        tries = [(near.point, near.weights)]
+    else:
+        # The floating body's law, with other values of q.
+        shifts = [math.log(one / FLOATING_UNREST[0]) for one in FLOATING_UNREST[1:]]
+        tries = [
+            (replace(start, log_intensity=start.log_intensity + one), weights) for one in shifts
+        ]
+    for point, known in tries:
+        if mode is None or not mode.converged:
+            mode = begin.find(point, known) or mode
     if mode is not None and not mode.converged:
         mode = begin.find(mode.point, mode.weights, held=FROM_NEAR)
     return mode if mode is not None and mode.converged else few
