@@ -173,8 +173,7 @@ def dense_filter(
     rows |= {"whitened": [], "jacobian": []}
     s = P = M = None
     last, outliers = -np.inf, 0
-    # After a gap or what is left out, and no sample has given a velocity since: nothing drags, and
-    # no error counts.
+    # After a gap, and no sample has given a velocity since: nothing drags, and no error counts.
     restarted = False
     for k in range(time.size):
         e, S, used = np.full(d, np.nan), np.full((d, d), np.nan), False
@@ -221,7 +220,6 @@ def dense_filter(
                 P = half @ kick @ P @ kick.T @ half.T + growth
             if track["excluded"][k]:
                 P = P + scipy.linalg.block_diag(0 * eye, unknown)
-                restarted = True
         value, R = sample_of(track, k, s, noise)
         there = not np.isnan(value[:2]).any()
         if s is not None and there:

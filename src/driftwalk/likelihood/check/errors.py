@@ -72,7 +72,6 @@ def innovations_of(estimate: Estimate) -> list[Innovations]:
         velocity = before[:, before.shape[1] // 2 :]
         speed[1:] = np.hypot(flow[0] - velocity[:, 0], flow[1] - velocity[:, 1])
         outlier = np.isfinite(white).all(axis=1) & ~used & (series.excluded == 0)
-        outlier[1:] &= ~series.begins[:-1]
         counted = used & series.settled
         white = np.where(counted[:, None], white, 0.0)
         found.append(Innovations(series, white, counted, outlier, speed))

@@ -87,15 +87,12 @@ class Series:
         its next errors are far smaller than it expects, and places where it often begins, which are
         those at the wall, would seem to have less noise.
         """
-        settled = ~self.begins
+        begins = np.concatenate([[True], self.gaps])
+        begins |= self.excluded != 0
+        settled = ~begins
         for later in range(1, FILTER.settling_samples + 1):
-            settled[later:] &= ~self.begins[:-later]
+            settled[later:] &= ~begins[:-later]
         return settled
-
-    @property
-    def begins(self) -> Bools:
-        """Which samples the filter begins at, with any velocity: the next error counts nowhere."""
-        return np.asarray(np.concatenate([[True], self.gaps]) | (self.excluded != 0))
 
     @property
     def pooled(self) -> int:
@@ -451,11 +448,11 @@ def _reach(block: Block) -> float:
 
 
 def usable_intervals(series: Sequence[Series]) -> int:
-    """Return the number of intervals that count: no gap, not left out, nor next after either."""
+    """Return the number of intervals that are not left out, no gaps, and not next after one."""
     count = 0
     for one in series:
         left_out = one.gaps | (one.excluded[1:] != 0)
-        left_out[1:] |= left_out[:-1].copy()
+        left_out[1:] |= one.gaps[:-1]
         count += int(np.count_nonzero(~left_out))
     return count
 
