@@ -13,7 +13,6 @@ from command_line import RECORDING, Done, here
 from redrawn import assert_drawn_alike
 
 import driftwalk as dw
-from driftwalk.schema.answers.facts import facts_of
 
 SHORT = ("--to", "150", "--spline-spacing", "3cm", "--force-interval", "16ms")
 STUDIES = Path(__file__).resolve().parents[3] / "studies" / "real"
@@ -101,8 +100,6 @@ def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path)
     assert found["check_left_out"] in lines[at + 1]
     with xr.open_dataset(tmp_path / "run" / "fit.nc", engine="h5netcdf") as stored:
         assert stored.attrs["check_left_out"] == found["check_left_out"]
-        assert not np.isfinite(facts_of(stored)["drag_coefficient_interval"][1])
-    assert found["drag_coefficient"] is None  # the recording does not determine it
     assert here("report", tmp_path / "run", "-o", tmp_path / "page.html").code == 0
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert found["check_left_out"] in page
