@@ -197,17 +197,16 @@ $(PACKAGE): $(BIN)/python $(NATIVE)
 	@$(COMPILE)
 	@touch $@
 
-# The package is installed by now, so its extras are all that pip adds.
+# The package is installed by now, so its extras are all that pip adds. Python compiles of them what is
+# imported, once.
 $(TEST_TOOLS): $(PACKAGE)
 	@echo "Installing what the tests need into $(VENV)."
 	$(PIP) "driftwalk[test]"
-	@$(COMPILE)
 	@touch $@
 
 $(DEV_TOOLS): $(TEST_TOOLS)
 	@echo "Installing the tools of development into $(VENV)."
 	$(PIP) "driftwalk[dev]"
-	@$(COMPILE)
 	@touch $@
 
 $(CROSS_TOOLS): $(DEV_TOOLS)

@@ -476,11 +476,11 @@ void check_orientations() {
     const double mean[4] = {0.03 * draw(random), 0.02 * draw(random), 0.1 * draw(random),
                             0.1 * draw(random)};
     double x = 0, y = 0;
-    for (int i = 0; i < 720; ++i) {
+    for (int i = 0; i < 90; ++i) {
       const driftwalk::DragResponse<2> one =
-          turned.drag<2>(i * std::acos(-1.0) / 1440, 0, mean, known, nullptr);
-      x += one.acceleration[0] / 720;
-      y += one.acceleration[1] / 720;
+          turned.drag<2>(i * std::acos(-1.0) / 180, 0, mean, known, nullptr);
+      x += one.acceleration[0] / 90;
+      y += one.acceleration[1] / 90;
     }
     const driftwalk::DragResponse<2> all = averaged.drag<2>(0.7, 3, mean, known, nullptr);
     worst = std::max(worst, std::hypot(all.acceleration[0] - x, all.acceleration[1] - y) /

@@ -134,7 +134,7 @@ def test_a_hostile_name_is_only_text(server: PageServer, visit: Callable[..., Vi
 def test_a_finished_run(
     server: PageServer,
     visit: Callable[..., Visit],
-    picture: Callable[..., Path],
+    picture: Callable[..., None],
     size: dict[str, int] | None,
     name: str,
 ) -> None:
@@ -148,7 +148,7 @@ def test_a_finished_run(
 
 def test_the_page_follows_a_sweep_from_begin_to_end(
     visit: Callable[..., Visit],
-    picture: Callable[..., Path],
+    picture: Callable[..., None],
     tmp_path: Path,
 ) -> None:
     """The sweep halts after each unit until the page was looked at: no machine is too fast."""
@@ -290,7 +290,7 @@ def turn(page: Any, name: str, share: float) -> None:
 
 
 def test_a_slider_changes_the_picture(
-    playground: PageServer, visit: Callable[..., Visit], picture: Callable[..., Path]
+    playground: PageServer, visit: Callable[..., Visit], picture: Callable[..., None]
 ) -> None:
     page = visit(f"http://127.0.0.1:{playground.port}/").open(playground.address)
     canvas = page.locator("canvas.tank-canvas")
@@ -318,7 +318,7 @@ def test_a_slider_changes_the_picture(
 
 
 def test_bodies_of_a_motion_model(
-    visit: Callable[..., Visit], picture: Callable[..., Path]
+    visit: Callable[..., Visit], picture: Callable[..., None]
 ) -> None:
     """A slider for each parameter; the trails fill more of the picture than the dots alone."""
     choices = ("--parameter", "speed=0.02", "--parameter", "turn_rate=-1,1")
@@ -392,7 +392,7 @@ def test_the_blocks_come_near_the_recording(
 
 
 def test_the_playground_on_a_phone(
-    playground: PageServer, visit: Callable[..., Visit], picture: Callable[..., Path]
+    playground: PageServer, visit: Callable[..., Visit], picture: Callable[..., None]
 ) -> None:
     page = visit(f"http://127.0.0.1:{playground.port}/", viewport=PHONE).open(playground.address)
     until_tank(page, "frames", 5)
@@ -423,7 +423,7 @@ def video(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_tracker_is_watched(
     visit: Callable[..., Visit],
-    picture: Callable[..., Path],
+    picture: Callable[..., None],
     video: Path,
     port: int,
     request: pytest.FixtureRequest,

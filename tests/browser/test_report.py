@@ -93,7 +93,7 @@ def test_settings_differ(page: Any, calibration: xr.Dataset) -> None:
 
 
 def test_a_click_near_the_optimum_shows_that_setting(
-    visit: Callable[..., Visit], picture: Callable[..., Path], tmp_path: Path
+    visit: Callable[..., Visit], picture: Callable[..., None], tmp_path: Path
 ) -> None:
     """The right side follows tab, click and keys, and says that the motion is a neighbour's."""
     found = synthetic_calibration()
@@ -168,7 +168,7 @@ def test_the_keyboard_does_the_same(page: Any, calibration: xr.Dataset) -> None:
     assert value == np.float32(calibration["ks_distance"][row, column])
 
 
-def test_every_section_is_drawn(page: Any, picture: Callable[..., Path]) -> None:
+def test_every_section_is_drawn(page: Any, picture: Callable[..., None]) -> None:
     for section in page.locator("section[data-kind]").all():
         words = section.inner_text()
         assert "cannot be shown" not in words, words
@@ -183,7 +183,7 @@ def test_every_section_is_drawn(page: Any, picture: Callable[..., Path]) -> None
 
 
 def test_on_a_phone_nothing_is_cut_off(
-    visit: Callable[..., Visit], report: Path, picture: Callable[..., Path]
+    visit: Callable[..., Visit], report: Path, picture: Callable[..., None]
 ) -> None:
     one = visit(report.as_uri(), viewport=PHONE)
     page = one.open(report.as_uri())
@@ -193,7 +193,7 @@ def test_on_a_phone_nothing_is_cut_off(
 
 
 def test_a_tap_reads_what_a_pointer_reads(
-    visit: Callable[..., Visit], report: Path, picture: Callable[..., Path]
+    visit: Callable[..., Visit], report: Path, picture: Callable[..., None]
 ) -> None:
     """A finger that taps does not move, and has left the chart before the click comes."""
     one = visit(report.as_uri(), viewport=PHONE, has_touch=True, is_mobile=True)
@@ -265,7 +265,7 @@ def test_names_in_a_warning_are_set_as_code(visit: Callable[..., Visit], tmp_pat
 
 
 def test_in_the_dark(
-    visit: Callable[..., Visit], report: Path, picture: Callable[..., Path]
+    visit: Callable[..., Visit], report: Path, picture: Callable[..., None]
 ) -> None:
     one = visit(report.as_uri(), color_scheme="dark")
     page = one.open(report.as_uri())

@@ -68,7 +68,7 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_file_is_small_and_moves_at_once(
-    saved: Path, browser: Any, visit: Callable[..., Visit], picture: Callable[..., Path]
+    saved: Path, browser: Any, visit: Callable[..., Visit], picture: Callable[..., None]
 ) -> None:
     assert len(gzip.compress(saved.read_bytes())) < MOST_BYTES
     require_soon(browser, saved.as_uri(), TANK)
@@ -214,7 +214,7 @@ def test_the_keyboard_leads_to_every_control(
 
 
 def test_nothing_is_cut_off_on_a_phone(
-    saved: Path, visit: Callable[..., Visit], picture: Callable[..., Path]
+    saved: Path, visit: Callable[..., Visit], picture: Callable[..., None]
 ) -> None:
     page = visit(LOCAL, viewport=PHONE).open(saved.as_uri())
     page.wait_for_function(MOVING)

@@ -170,7 +170,7 @@ def test_the_keyboard_selects_a_setting(page: Any, found: xr.Dataset) -> None:
 def test_it_fits_every_screen_and_theme(
     visit: Callable[..., Visit],
     report: Path,
-    picture: Callable[..., Path],
+    picture: Callable[..., None],
     name: str,
     options: dict[str, Any],
 ) -> None:
@@ -186,7 +186,7 @@ def test_it_fits_every_screen_and_theme(
 
 def test_a_running_analysis_shows_the_settings_that_are_there(
     visit: Callable[..., Visit],
-    picture: Callable[..., Path],
+    picture: Callable[..., None],
     found: xr.Dataset,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -227,7 +227,7 @@ def test_a_running_analysis_shows_the_settings_that_are_there(
 
 
 def test_settings_on_no_map_are_chosen_from_a_list(
-    visit: Callable[..., Visit], picture: Callable[..., Path], tmp_path: Path
+    visit: Callable[..., Visit], picture: Callable[..., None], tmp_path: Path
 ) -> None:
     """Words along an axis: each setting by its name, with the keyboard."""
     study = dw.Study(

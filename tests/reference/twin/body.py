@@ -24,7 +24,10 @@ def turned(vectors: Floats, angle: float) -> Floats:
     """Return vectors (..., 2) turned by an angle [rad]."""
     cosine, sine = np.cos(angle), np.sin(angle)
     x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+    found = np.empty(vectors.shape)
+    found[..., 0] = cosine * x - sine * y
+    found[..., 1] = sine * x + cosine * y
+    return found
 
 
 def wrapped(angle: float) -> float:

@@ -1,4 +1,4 @@
-"""An HDF5 file that names other files for its contents: nothing of them is read."""
+"""An HDF5 file that names other files is refused, and what is written is what xarray writes."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import xarray as xr
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.stores.hdf5 import opened_hdf5
-from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
+from driftwalk.schema.stores.netcdf import kind_of_file, netcdf_bytes, open_netcdf
 
 
 def linked(file: h5py.File, secret: Path) -> None:
@@ -67,3 +68,49 @@ def test_links_within_the_file_are_read(tmp_path: Path) -> None:
     found = open_netcdf(path)
     for name in ("a", "b"):
         np.testing.assert_array_equal(found[name], np.arange(3.0))
+
+
+def contents(path: Path) -> list[object]:
+    """Return what HDF5 holds by h5py alone, in its order: arrays, how they lie, attributes."""
+
+    def attributes(entry: h5py.HLObject) -> list[tuple[str, object]]:
+        # References to other entries are compared by the axes that they name.
+        return [
+            (name, repr(value)) for name, value in entry.attrs.items() if not name.endswith("_LIST")
+        ]
+
+    with h5py.File(path) as file:
+        found: list[object] = [attributes(file)]
+        for name, entry in file.items():
+            axes = [[scale.name for scale in axis.values()] for axis in entry.dims]
+            packed = (entry.chunks, entry.compression, entry.compression_opts, entry.shuffle)
+            shape = (str(entry.dtype), entry.shape, entry.maxshape)
+            found.append([name, shape, packed, axes, attributes(entry), repr(entry[()])])
+        return found
+
+
+def test_a_file_holds_what_the_library_s_own_writer_leaves(tmp_path: Path) -> None:
+    """With an axis that has no values, an empty one, one that may grow, and texts."""
+    dataset = xr.Dataset(
+        {
+            "u": (("y", "x"), np.linspace(0.0, 1.0, 1200).reshape(40, 30), {"units": "m s-1"}),
+            "flag": (("y", "x"), np.zeros((40, 30), np.int8)),
+            "knot": (("part", "knot_x"), np.ones((2, 3))),
+            "number": ("none", np.zeros(0)),
+            "single": ((), 3),
+            "name": ("part", np.array(["a", "bä"], dtype=object)),
+            "x": ("x", np.arange(30.0)),
+            "part": ("part", np.array(["one", "two"], dtype=object)),
+            "sure": ("time", np.array([True, False, True])),
+        },
+        attrs={"kind": "none", "values": [1.5, 2.5], "count": 3},
+    )
+    dataset.encoding["unlimited_dims"] = {"time"}
+    own, other = tmp_path / "own.nc", tmp_path / "other.nc"
+    own.write_bytes(netcdf_bytes(dataset))
+    packed = {key: {"zlib": True, "complevel": 4, "shuffle": True} for key in ("u", "flag")}
+    dataset.to_netcdf(other, engine="h5netcdf", encoding=packed)
+    assert contents(own) == contents(other)
+    with h5py.File(own) as file:
+        assert [scale.name for scale in file["u"].dims[1].values()] == ["/x"]
+        assert file["sure"].maxshape == (None,)

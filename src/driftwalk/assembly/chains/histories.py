@@ -109,12 +109,13 @@ def histories(datasets: Sequence[xr.Dataset], *, classes: Sequence[str] | None =
                 f"{kind!r}"
             )
         rows += _of_runs(found) if kind == "assembly" else _of_recording(found)
-    if counted := [name for row in rows for name in row[0] if counted_assemblies(name)]:
+    passed = dict.fromkeys(name for row in rows for name in row[0])
+    if counted := [name for name in passed if counted_assemblies(name)]:
         raise InputError(
             f"the class '{counted[0]}' counts assemblies, as classes of more than {MOST_NAMED} "
             f"blocks do, and rates are between shapes: use at most {MOST_NAMED} blocks"
         )
-    names = tuple(dict.fromkeys([*(classes or ()), *(name for row in rows for name in row[0])]))
+    names = tuple(dict.fromkeys([*(classes or ()), *passed]))
     if not rows:
         raise InputError("no run has an outcome class: there is nothing to estimate rates from")
     sizes = {blocks_of(name) for name in names}
@@ -151,12 +152,13 @@ def blocks_of(name: str) -> int:
 
 def _listed(rows: list[tuple[list[str], Floats, float]], names: tuple[str, ...]) -> Histories:
     place = {name: index for index, name in enumerate(names)}
-    run, state, duration, target = [], [], [], []
+    run, state, target = [], [], []
+    duration: list[Floats] = []
     for number, (passed, entry, end) in enumerate(rows):
         run += [number] * len(passed)
         state += [place[name] for name in passed]
         target += [*(place[name] for name in passed[1:]), OPEN]
-        duration.append(np.diff(np.append(entry, end)))
+        duration += [entry[1:] - entry[:-1], np.array([end - entry[-1]])]
     lasts = np.concatenate(duration)
     # Two events of one time step: the class between them lasted less than the step.
     shortest = lasts[lasts > 0].min(initial=1.0)
@@ -180,12 +182,12 @@ def _of_runs(assembly: xr.Dataset) -> list[tuple[list[str], Floats, float]]:
     order = np.argsort(np.where(np.isfinite(time), time, np.inf), axis=1, kind="stable")
     time, after = (np.take_along_axis(one, order, axis=1) for one in (time, after))
     end = assembly["end_time"].values
+    real = np.isfinite(time) & (after >= 0)
     rows = []
     for at in np.flatnonzero(assembly["outcome"].values >= 0):
-        real = np.isfinite(time[at]) & (after[at] >= 0)
-        passed = [start, *(names[index] for index in after[at][real])]
-        entry = np.r_[0.0, time[at][real]]
-        begun = int(np.flatnonzero(entry == 0.0)[-1])  # glued blocks join at time 0
+        passed = [start, *(names[index] for index in after[at, real[at]].tolist())]
+        entry = np.concatenate([[0.0], time[at, real[at]]])
+        begun = int((entry == 0.0).nonzero()[0][-1])  # glued blocks join at time 0
         rows.append(_merged(passed[begun:], entry[begun:], float(end[at])))
     return rows
 

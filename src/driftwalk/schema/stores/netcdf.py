@@ -12,6 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -73,12 +74,23 @@ def netcdf_bytes(dataset: xr.Dataset) -> bytes:
     >>> netcdf_bytes(dw.tank30_flow())[1:4]
     b'HDF'
     """
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    from driftwalk.schema.stores.open_hdf5 import OpenHdf5
+
     packed = {
         name: {"zlib": True, "complevel": 4, "shuffle": True}
         for name, variable in dataset.data_vars.items()
         if variable.dtype.kind in "fiu" and variable.size > 1000
     }
-    return bytes(dataset.to_netcdf(engine="h5netcdf", encoding=packed))
+    growing = [name for name in dataset.encoding.get("unlimited_dims", ()) if name in dataset.sizes]
+    written = BytesIO()
+    # What `Dataset.to_netcdf` does, with a file that looks each object up once.
+    with OpenHdf5(written, "w") as file, h5netcdf.File(file, "w") as named:
+        store = H5NetCDFStore(named)
+        dataset.dump_to_store(store, encoding=packed, unlimited_dims=growing)
+    return written.getvalue()
 
 
 def text_attribute(path: Path, name: str) -> str | None:

@@ -8,11 +8,12 @@ import h5py
 
 
 class OpenHdf5(h5py.File):  # type: ignore[misc]
-    """A file that is read, and keeps the objects that it was asked for until it is closed."""
+    """A file that keeps the objects that it was asked for until it is closed."""
 
-    def __init__(self, path: Any) -> None:
-        super().__init__(path, "r")
-        self._kept: dict[str, Any] = {}
+    def __init__(self, path: Any, mode: str = "r") -> None:
+        # NetCDF-4 keeps the order in which things were written.
+        super().__init__(path, mode, track_order=None if mode == "r" else True)
+        self._kept: dict[str, Any] = {"/": self}
 
     def __getitem__(self, name: Any) -> Any:
         """Return the object of a name, or of a reference, which is no name."""
@@ -21,3 +22,9 @@ class OpenHdf5(h5py.File):  # type: ignore[misc]
         if name not in self._kept:
             self._kept[name] = super().__getitem__(name)
         return self._kept[name]
+
+    def __delitem__(self, name: str) -> None:
+        """Remove the object of a name, which another one may get."""
+        super().__delitem__(name)
+        for kept in (name, f"/{name}"):
+            self._kept.pop(kept, None)
