@@ -42,7 +42,9 @@ class EmPolicy(NamedTuple):
     events_per_bin: int = 20
     """Fewer events of a class than ten bins of these give it fewer bins."""
     weight: float = 1.0
-    """Events at the mean rate of the class, added to each bin so that none is empty; by hand."""
+    """Events that are added to each bin, at the mean rate of the class, and to each transition, in
+    its mean share of them. By hand: .3 and 2 change the held-out log likelihood per run by .012 at
+    most (2000 runs, seven settings of `studies/kinetics`)."""
     switch_weight: float = 0.5
     """Runs that are added to each change of hidden state."""
     spread: float = 6.0
@@ -225,6 +227,13 @@ def _expected(
     return forward * backward, switches, score
 
 
+def _with_prior(events: Floats, times: Floats, rate: Floats) -> Floats:
+    """Return rates, with a prior of so many events at a given rate; a given zero stays zero."""
+    lasted = np.divide(EM_POLICY.weight, rate, out=np.zeros_like(rate), where=rate > 0)
+    above, below = events + EM_POLICY.weight, times + lasted
+    return np.divide(above, below, out=np.zeros_like(events), where=rate > 0)
+
+
 def _maximised(
     found: Histories,
     data: _Data,
@@ -239,12 +248,12 @@ def _maximised(
     share = gamma * runs[found.run][:, None]
     events = (data.events @ share).reshape(model.hazard.shape)
     times = (data.exposure.T @ share).reshape(size, bins, 1, states)
-    # A prior of so many events at the mean rate of the transition: a rate of zero stays zero.
-    known = mean[:, None, :, None] > 0
-    lasted = np.divide(EM_POLICY.weight, mean, out=np.zeros_like(mean), where=mean > 0)
-    below = times + lasted[:, None, :, None]
-    above = events + EM_POLICY.weight * known
-    hazard = np.divide(above, below, out=np.zeros_like(above), where=known)
+    # A prior for each transition would count as several events of the class at its mean rate.
+    total = mean.sum(axis=1)[:, None, None, None]
+    whole = _with_prior(events.sum(axis=2, keepdims=True), times, total)
+    hazard = _with_prior(
+        events, times, whole * mean[:, None, :, None] / np.where(total > 0, total, 1.0)
+    )
     first = data.ranks[0]
     start = np.zeros((size, states))
     np.add.at(start, found.state[first], share[first])
