@@ -197,8 +197,8 @@ $(PACKAGE): $(BIN)/python $(NATIVE)
 	@$(COMPILE)
 	@touch $@
 
-# The package is installed by now, so its extras are all that pip adds. Python compiles of them what is
-# imported, once.
+# The package is installed by now, so pip adds its extras alone. Python compiles each of their modules at
+# its first import.
 $(TEST_TOOLS): $(PACKAGE)
 	@echo "Installing what the tests need into $(VENV)."
 	$(PIP) "driftwalk[test]"

@@ -137,7 +137,7 @@ def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
 
 @pytest.fixture
 def picture() -> Callable[..., None]:
-    """Return a function that takes a screenshot of a page, whole, where someone wants to look."""
+    """Return a function that saves a picture of a page where ``DRIFTWALK_SCREENSHOTS`` is set."""
     folder = os.environ.get("DRIFTWALK_SCREENSHOTS")
 
     def take(page: Page, name: str, *, whole: bool = True) -> None:

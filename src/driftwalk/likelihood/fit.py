@@ -59,6 +59,7 @@ from driftwalk.likelihood.newton import (
 )
 from driftwalk.likelihood.preparation import (
     AngleUse,
+    Estimate,
     PreparedRecordings,
     as_list,
     prepare,
@@ -72,6 +73,7 @@ from driftwalk.likelihood.refuse import (
 )
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import build_fit, law_facts, visited_shares, whiteness_of
+from driftwalk.likelihood.spline import Spline
 from driftwalk.likelihood.start import Starts, first_points, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema.answers.facts import texts
@@ -160,11 +162,7 @@ def fit_motion(
         ready = replace(ready, earlier=earlier_prior(ready, before))
     passes = ready.passes
     spline = passes.spline
-    starts = (
-        first_points(ready, spline)
-        if before is None
-        else Starts(*2 * [first_glued_point(ready, before)])
-    )
+    starts = _starts(ready, spline, before)
     assumptions = assumptions_of(
         chosen, ready.angle, recordings=len(ready.tracks), flows=passes.flows
     )
@@ -251,6 +249,14 @@ def fit_motion(
     )
 
 
+def _starts(ready: PreparedRecordings, spline: Spline, before: Estimate | None) -> Starts:
+    """Return where the search begins, for glued blocks at the fit of one block before."""
+    if before is None:
+        return first_points(ready, spline)
+    glued = first_glued_point(ready, before)
+    return Starts(glued, (glued,))
+
+
 def _laws_with_modes(
     search: ModeSearch, assumptions: Assumptions, starts: Starts, ready: PreparedRecordings
 ) -> tuple[ModeSearch, LawSearch, LawResult, FlowModes]:
@@ -271,7 +277,7 @@ def _laws_with_modes(
             return search, laws, law, modes
     search = with_layers(search, modes.layers)
     assumptions = replace(assumptions, opened={**assumptions.opened, **modes.opened})
-    found = Starts(modes.start, modes.start)
+    found = Starts(modes.start, (modes.start,))
     laws, law = _laws_of(search, assumptions, found, modes.weights or weights, ready)
     return search, laws, law, modes
 

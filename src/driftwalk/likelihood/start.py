@@ -28,14 +28,14 @@ class Starts(NamedTuple):
     """Where the search begins under each force law."""
 
     paper: Point
-    floating: Point
-    """With the first of `FLOATING_UNREST`."""
+    floating: tuple[Point, ...]
+    """They are tried in this order until a search converges."""
 
 
 FLOATING_UNREST: Final = (64.0, 4.0, 16.0)
-"""First values of q of a floating body, over that of the paper's law, in the order in which they
-are tried. On small orbits each of them fails now and then: of 35 floating bodies of studies/verdict
-two were not found with 4 alone, and one not with 16; 64 found the four hardest of them."""
+"""First values of q under the law of a floating body, as multiples of that under the paper's. On
+small orbits each fails for some bodies, but not for the same ones: of 35 in studies/verdict two
+were not found from 4 alone and one not from 16; 64 found the four hardest."""
 
 
 def first_points(ready: PreparedRecordings, spline: Spline) -> Starts:
@@ -49,12 +49,12 @@ def first_points(ready: PreparedRecordings, spline: Spline) -> Starts:
 
     paper = first_point(ready, spline)
     tracer = apply_overrides(ready.study, {"flow.inertia": "none"})
-    floating = replace(
-        paper,
-        coefficients=_first_coefficients(ready, tracer, spline),
-        log_intensity=paper.log_intensity + math.log(FLOATING_UNREST[0]),
-    )
-    return Starts(paper, floating)
+    flow = _first_coefficients(ready, tracer, spline)
+    floating = [
+        replace(paper, coefficients=flow, log_intensity=paper.log_intensity + math.log(one))
+        for one in FLOATING_UNREST
+    ]
+    return Starts(paper, tuple(floating))
 
 
 def first_point(ready: PreparedRecordings, spline: Spline) -> Point:

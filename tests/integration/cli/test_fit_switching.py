@@ -58,7 +58,7 @@ def test_the_model_with_the_switch_explains_the_recording(finished: tuple[Path, 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_without_the_switch_it_does_not(recording: Path, tmp_path: Path) -> None:
-    """The steps alone do not show it."""
+    """The check says that the motion, or the strength of the flow, changes."""
     found = answer(
         here(
             "fit", recording, *COARSE, "--flow-strength", "constant", "-o", tmp_path / "s", "--json"

@@ -228,7 +228,7 @@ def _expected(
 
 
 def _with_prior(events: Floats, times: Floats, rate: Floats) -> Floats:
-    """Return rates, with a prior of so many events at a given rate; a given zero stays zero."""
+    """Return rates, with a prior of so many events at a given rate; a rate of zero stays zero."""
     lasted = np.divide(EM_POLICY.weight, rate, out=np.zeros_like(rate), where=rate > 0)
     above, below = events + EM_POLICY.weight, times + lasted
     return np.divide(above, below, out=np.zeros_like(events), where=rate > 0)
@@ -248,7 +248,8 @@ def _maximised(
     share = gamma * runs[found.run][:, None]
     events = (data.events @ share).reshape(model.hazard.shape)
     times = (data.exposure.T @ share).reshape(size, bins, 1, states)
-    # A prior for each transition would count as several events of the class at its mean rate.
+    # One event of the class, then one of each transition in its share of the bin's rate. One each
+    # at its own mean rate would count as several events of the class.
     total = mean.sum(axis=1)[:, None, None, None]
     whole = _with_prior(events.sum(axis=2, keepdims=True), times, total)
     hazard = _with_prior(

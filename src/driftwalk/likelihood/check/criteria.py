@@ -75,8 +75,8 @@ class LeastPolicy(NamedTuple):
     names. In ten worlds whose flow grows or pulses by 2 %, C_d was off by 0 to 1 % (median), as in
     a steady one (studies/misfit, set sizes)."""
     kurtosis: float = 0.3
-    """Excess kurtosis of the errors of prediction: the standard error of sigma_F, which goes with
-    (1 + kurtosis / 2)^(1/2), is 7 % too small then, and the estimate the same."""
+    """Excess kurtosis of the errors of prediction. The standard error of sigma_F is proportional to
+    (1 + kurtosis / 2)^(1/2): at 0.3 it is stated 7 % too small. The estimate does not change."""
 
 
 LARGEST: Final = LargestPolicy()

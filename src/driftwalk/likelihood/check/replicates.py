@@ -26,6 +26,7 @@ from driftwalk.core.processors import map_in_threads
 from driftwalk.core.random_streams import CheckStream, world_keys
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.likelihood.check.restarts import (
+    RESTART,
     Sections,
     States,
     first_samples,
@@ -33,7 +34,7 @@ from driftwalk.likelihood.check.restarts import (
     within_sections,
 )
 from driftwalk.likelihood.filter.parameters import INTENSITIES, PULSES, STRENGTHS, Point
-from driftwalk.likelihood.filter.series import Series, wall_intervals
+from driftwalk.likelihood.filter.series import Series, smooth_angle, wall_intervals
 from driftwalk.likelihood.fitted_modes import flow_frames
 from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
 from driftwalk.likelihood.preparation import Estimate
@@ -126,7 +127,8 @@ def problems_of(
 def filtered_states(estimate: Estimate) -> list[States]:
     """Return the states of the filter after each sample, series by series.
 
-    Where the angle is not a part of them, they have that of the recording.
+    Where the angle is not a part of them, they have that of the recording. NaN where the filter
+    knows no velocity.
     """
     found = []
     for one, track in zip(estimate.passes.series, estimate.tracks, strict=True):
@@ -137,9 +139,16 @@ def filtered_states(estimate: Estimate) -> list[States]:
         at = np.arange(6) if size == 6 else np.array([0, 1, 3, 4])
         mean[:, at] = values
         covariance[:, at[:, None], at] = run["errors"][:, 2, :size, :size]
-        if size < 6:
-            unused = estimate.passes.body.orientation == "none"
-            mean[:, 2], mean[:, 5] = track.theta if unused else one.angle, one.omega
+        if estimate.passes.body.orientation == "given":
+            mean[:, 2], mean[:, 5] = one.angle, one.omega
+        elif size < 6:
+            # The filter has no angle: replicates turn from the recorded one, if there is any.
+            smooth = smooth_angle(track.time, track.theta)
+            mean[:, 2] = np.where(smooth.known, smooth.theta, np.nan)
+            mean[:, 5] = np.where(smooth.known, smooth.omega, 0.0)
+        rates = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)[:, 3:])
+        rates[:, 2] *= 0.5 * estimate.passes.body.side
+        mean[~(rates.max(axis=1) < RESTART.most_velocity_std_m_s)] = np.nan
         found.append(States(mean, covariance))
     return found
 

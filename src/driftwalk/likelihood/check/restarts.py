@@ -3,9 +3,9 @@
 A simulated block that runs freely for ten minutes leaves the part of the tank that the recording
 has seen. The flow that the fit continues there may hold it for good, and its steps then say nothing
 about the model. From the recorded pose a block cannot stray far, and replicates differ less from
-each other, so a misfit of the model is found sooner. They begin with the state of the filter, drawn
-with its covariance: so under the right model the recording goes on as its replicates do. From a
-parabola through the samples of 1.4 s, bodies that float on small orbits went 14 % too fast.
+each other, so a misfit of the model is found sooner. They begin at the filter's state, drawn with
+its covariance: under the right model they go on as the recording does. Started from a parabola
+through 1.4 s, bodies that float on small orbits went 14 % too fast.
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ class RestartPolicy(NamedTuple):
     own: a fit of a flow that is reversed half way has so little drag that in ten seconds a block
     hardly forgets the recorded velocity."""
     most_velocity_std_m_s: float = 0.05
-    """Standard deviation of the filter's velocity beyond which it knows none. It takes 0.1 m/s for
-    it after a gap or a contact, and a few mm/s remain after two samples."""
+    """Standard deviation of a velocity component, that of a face by the turning too, from which on
+    the filter's velocity is not used. The filter assumes 0.1 m/s at its first sample and after a
+    gap or a contact; two samples later a few mm/s are left."""
     on_grid: float = 0.05
     """Share of the usual interval by which time stamps may be off a regular grid, on which all
     sections are simulated together; as for steps (`STEP_PLAN`)."""
@@ -71,7 +72,7 @@ class Sections:
     begin: Floats
     """When each section begins, after the recording's first sample [s]."""
     start: Start
-    """Pose and motion at the first sample of each."""
+    """Mean pose and motion at the first sample of each."""
     sample: Integers
     """Samples of the recording that lie in the sections."""
     section: Integers
@@ -83,7 +84,8 @@ class Sections:
 
     def starts(self, count: int, key: int) -> Start:
         """Return starts of `count` replicates, drawn from what is known of the recorded motion."""
-        normal = np.random.default_rng(key).normal(size=(count, *self.root.shape[:2]))
+        # The camera's errors come from the key alone.
+        normal = np.random.default_rng([key, 1]).normal(size=(count, *self.root.shape[:2]))
         found = np.column_stack(self.start) + np.einsum("sab,csb->csa", self.root, normal)
         return Start(*found.reshape(-1, 6).T)
 
@@ -127,7 +129,7 @@ def first_samples(track: Track, every: float) -> Integers:
 def sections_of(track: Track, first: Integers, states: States, *, window: float) -> list[Sections]:
     """Return the sections of a track, which begin where the filter's states are.
 
-    Where it knows no velocity a parabola through the samples of a window [s] has to do.
+    Where the filter knows no velocity a parabola through the samples of two windows [s] is used.
     """
     time = track.time - track.time[0]
     ends = np.append(first[1:], time.size)
@@ -175,8 +177,7 @@ def _starts(
     track: Track, first: Integers, ends: Integers, states: States, *, window: float
 ) -> tuple[Start, Floats]:
     """Return pose and motion at the first sample of each section, and roots of covariances."""
-    std = np.sqrt(states.covariance[:, 3, 3])
-    sure = np.isfinite(states.mean[:, 0]) & (std < RESTART.most_velocity_std_m_s)
+    sure = np.isfinite(states.mean[:, 3])
     parts = [
         recorded_start(Track(*(axis[begin:end] for axis in track)), window=window)
         for begin, end in zip(first, ends, strict=True)

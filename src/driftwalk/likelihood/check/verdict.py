@@ -29,9 +29,9 @@ class InformationPolicy(NamedTuple):
     """
 
     least_visited: float = 0.08
-    """Share of the tank, where the law is not that of a floating body. In two orbits over 4 and 6 %
-    of it C_d came out 41 and 83 % off under the paper's, and every criterion passed. Under the
-    floating body's, C_d was 0 to 9 % off in twelve over 2 to 6 % (held-out set)."""
+    """Share of the tank. Not asked of a floating body: its C_d was 0 to 9 % off in twelve orbits
+    over 2 to 6 % (held-out set). Under the paper's law two orbits over 4 and 6 % had C_d 41 and
+    83 % off, and passed every criterion."""
     least_blocks: float = 5.0
     """Area in blocks: those orbits covered 2.5 and 3.5, and one along half the radius of the usual
     tank covers 10."""
@@ -104,7 +104,7 @@ def _without_power(criteria: Sequence[Criterion], drag_std: float) -> Iterator[s
 
 
 def _too_little_seen(fit: xr.Dataset, *, side_m: float) -> Iterator[str]:
-    """Say where the block has been over too little of the tank, in any of the flows."""
+    """Say where a block that does not float has been over too little of the tank, in any flow."""
     if fit.attrs["force_law"] == "floating body":
         return
     share = min(visited_shares(fit))

@@ -31,7 +31,7 @@ from driftwalk.likelihood.newton import (
 )
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.refuse import BREAKDOWN
-from driftwalk.likelihood.start import FLOATING_UNREST, Starts
+from driftwalk.likelihood.start import Starts
 from driftwalk.schema.answers.force_law import LEAST_EVIDENCE, OPENED_SIGMAS
 
 
@@ -101,7 +101,10 @@ class LawSearch:
         known = self.assumptions.fixed
         starts = Starts(
             replace(starts.paper, opened=self.assumptions.opened, fixed=known),
-            replace(starts.floating, opened=self.assumptions.opened, fixed={**known, **FLOATING}),
+            tuple(
+                replace(one, opened=self.assumptions.opened, fixed={**known, **FLOATING})
+                for one in starts.floating
+            ),
         )
         base = self._base(starts, weights)
         found = self._beside(base, "departures from it", lambda: self.selection.select(base))
@@ -137,9 +140,8 @@ class LawSearch:
     def _base(self, starts: Starts, weights: Weights) -> LawResult:
         if self.assumptions.pressure_gradient != "auto":
             on = self.assumptions.pressure_gradient == "on"
-            mode = require_mode(
-                self.search.find_from_afar(starts.floating if on else starts.paper, weights)
-            )
+            tries = starts.floating if on else (starts.paper,)
+            mode = require_mode(self._from_afar(tries, weights))
             return self._alone(mode, floating=on)
         paper = self.search.find_from_afar(starts.paper, weights)
         if paper is not None and paper.converged:
@@ -202,7 +204,7 @@ class LawSearch:
         series = beginning(search.passes)
         begin = search.of(series)
         tried = {
-            "paper": _mode_in(begin, starts.paper, weights, near=paper),
+            "paper": _mode_in(begin, (starts.paper,), weights, near=paper),
             "floating": _mode_in(begin, starts.floating, weights),
         }
         found = {name: mode for name, mode in tried.items() if mode is not None}
@@ -227,6 +229,15 @@ class LawSearch:
         # Below zero where the other law has more evidence, but too little, or no solution on all.
         return LawResult(paper, paper, False, evidence, -ahead, None)
 
+    def _from_afar(self, points: Sequence[Point], weights: Weights) -> Mode | None:
+        """Return the mode from the first of some points from which a search converges."""
+        mode = None
+        for point in points:
+            mode = self.search.find_from_afar(point, weights) or mode
+            if mode is not None and mode.converged:
+                break
+        return mode
+
     def _alone(self, mode: Mode, *, floating: bool) -> LawResult:
         evidence = {"floating" if floating else "paper": evidence_of(mode, self.search.prior)}
         return LawResult(mode, mode, floating, evidence, math.inf, None)
@@ -247,7 +258,7 @@ class LawSearch:
         otherwise than its drag makes it. So the search begins again. A marker that is off or pulses
         of the flow make the block turn as well: the caller compares the law with them.
         """
-        start = starts.floating if base.floating else starts.paper
+        start = starts.floating[0] if base.floating else starts.paper
         point = replace(start, opened={**start.opened, **DRAGS["power"].opened})
         mode = self.search.find_from_afar(point, weights)
         if (
@@ -288,9 +299,9 @@ class LawSearch:
         mode = found.mode
         fixed = {name: value for name, value in mode.point.fixed.items() if name not in FLOATING}
         fixed |= {} if found.floating else FLOATING
-        start = starts.paper if found.floating else starts.floating
-        point = replace(start, opened=mode.point.opened, fixed=fixed)
-        rival = self.search.find_from_afar(point, mode.weights)
+        starts_of_it = (starts.paper,) if found.floating else starts.floating
+        points = [replace(one, opened=mode.point.opened, fixed=fixed) for one in starts_of_it]
+        rival = self._from_afar(points, mode.weights)
         return rival if rival is not None and rival.converged else None
 
     def _supported(self, found: LawResult) -> LawResult:
@@ -312,11 +323,11 @@ class LawSearch:
         interval of 3 %. So the intervals hold what both laws give.
         """
         tests, name = found.tests, "drag_power"
-        known = set(DRAG_SHAPES) & set(found.mode.point.opened) or found.unsettled
-        if known or name not in self.assumptions.tried:
+        shaped = set(DRAG_SHAPES) & set(found.mode.point.opened)
+        if shaped or found.unsettled or name not in self.assumptions.tried:
             return found
         if tests is not None and name not in tests.names:
-            # It was opened, and closed again.
+            # It, or a linear part, was opened and closed again.
             tests = score_tests(self.search, found.mode, [name])
         if tests is None or abs(tests.sigmas.get(name, 0.0)) <= LAW.slight_sigmas:
             return found
@@ -361,29 +372,25 @@ class LawSearch:
 
 
 def _mode_in(
-    begin: ModeSearch, start: Point, weights: Weights, *, near: Mode | None = None
+    begin: ModeSearch, starts: Sequence[Point], weights: Weights, *, near: Mode | None = None
 ) -> Mode | None:
-    """Return the mode of a law in the beginning, by way of one `near` it where that helps.
+    """Return the mode of a law in the beginning, from other points where the first one fails.
 
     Evidences are compared at the maxima: after as many steps as the paper's law takes, the right
     law of a small orbit was still hundreds of nats behind. Where none is reached the first steps
     have to do.
     """
-    few = begin.shortened().find(start, weights)
+    few = begin.shortened().find(starts[0], weights)
     if few is not None and few.converged:
         return few
-    mode = begin.find(start, weights)
+    tries = [(point, weights) for point in starts]
     if near is not None:
-        tries = [(near.point, near.weights)]
-    else:
-        # The floating body's law, with other values of q.
-        shifts = [math.log(one / FLOATING_UNREST[0]) for one in FLOATING_UNREST[1:]]
-        tries = [
-            (replace(start, log_intensity=start.log_intensity + one), weights) for one in shifts
-        ]
+        tries.append((near.point, near.weights))
+    mode = None
     for point, known in tries:
-        if mode is None or not mode.converged:
-            mode = begin.find(point, known) or mode
-    if mode is not None and not mode.converged:
+        mode = begin.find(point, known) or mode
+        if mode is not None and mode.converged:
+            return mode
+    if mode is not None:
         mode = begin.find(mode.point, mode.weights, held=FROM_NEAR)
     return mode if mode is not None and mode.converged else few

@@ -86,10 +86,11 @@ def netcdf_bytes(dataset: xr.Dataset) -> bytes:
     }
     growing = [name for name in dataset.encoding.get("unlimited_dims", ()) if name in dataset.sizes]
     written = BytesIO()
-    # What `Dataset.to_netcdf` does, with a file that looks each object up once.
+    # What `Dataset.to_netcdf` does, with a file that looks each object up once. A store writes
+    # arrays of dask only when its writer is synchronised, so they are computed first.
     with OpenHdf5(written, "w") as file, h5netcdf.File(file, "w") as named:
         store = H5NetCDFStore(named)
-        dataset.dump_to_store(store, encoding=packed, unlimited_dims=growing)
+        dataset.compute().dump_to_store(store, encoding=packed, unlimited_dims=growing)
     return written.getvalue()
 
 

@@ -13,6 +13,7 @@ class OpenHdf5(h5py.File):  # type: ignore[misc]
     def __init__(self, path: Any, mode: str = "r") -> None:
         # NetCDF-4 keeps the order in which things were written.
         super().__init__(path, mode, track_order=None if mode == "r" else True)
+        # The root is asked for most often. It has to be this file, which keeps what it hands out.
         self._kept: dict[str, Any] = {"/": self}
 
     def __getitem__(self, name: Any) -> Any:

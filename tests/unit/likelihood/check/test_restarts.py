@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from driftwalk.comparison import StepDistance, apply_steps
 from driftwalk.core.arrays import Floats
+from driftwalk.likelihood.check.replicates import filtered_states
 from driftwalk.likelihood.check.restarts import (
     RESTART,
     States,
@@ -15,7 +20,10 @@ from driftwalk.likelihood.check.restarts import (
     sections_of,
     within_sections,
 )
-from driftwalk.schema import Track
+from driftwalk.likelihood.preparation import prepare
+from driftwalk.likelihood.start import first_point
+from driftwalk.model import Study
+from driftwalk.schema import Track, build_trajectory
 
 WINDOW_S = 0.7
 
@@ -104,7 +112,7 @@ def test_starts_are_drawn_from_the_states_of_the_filter() -> None:
     mean = generator.normal(size=(track.time.size, 6))
     half = 1e-2 * generator.normal(size=(track.time.size, 6, 6))
     states = States(mean, half @ half.transpose(0, 2, 1))
-    states.covariance[first[2]] = np.eye(6)
+    states.mean[first[2]] = np.nan
     (one,) = sections_of(track, first, states, window=WINDOW_S)
     drawn = np.reshape(one.starts(4000, 7), (6, 4000, first.size))
     for k, at in enumerate(first):
@@ -117,6 +125,41 @@ def test_starts_are_drawn_from_the_states_of_the_filter() -> None:
         assert (np.abs(drawn[:, :, k].mean(axis=1) - mean[at]) < 5.0 * error).all()
         scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
         assert np.abs((np.cov(drawn[:, :, k]) - wanted) / scale).max() < 5.0 * np.sqrt(2.0 / 4000)
+
+
+@pytest.mark.parametrize(
+    ("angle", "memory"), [("state", 0.0), ("state", 0.2), ("given", 0.0), ("none", 0.0)]
+)
+def test_states_are_those_of_the_filter(angle: Any, memory: float) -> None:
+    """A circle with a noisy camera and a gap: the filter's state, and the angle that it lacks."""
+    time, noise = 0.1 * np.arange(400), np.random.default_rng(5)
+    turned = 0.4 * time
+    parts = 0.06 * np.cos(turned), 0.06 * np.sin(turned), 0.5 * turned
+    x, y, theta = (one + 3e-4 * noise.normal(size=one.shape) for one in parts)
+    x[200:230] = np.nan
+    ready = prepare([build_trajectory(time, x, y, theta)], Study(), angle, None)
+    point = first_point(ready, ready.passes.spline)
+    point = replace(point, log_intensity=np.log(3e-5), log_noise=np.log(4e-4))
+    if memory:
+        point = point.with_extra("force_memory", memory)
+    estimate: Any = SimpleNamespace(passes=ready.passes, tracks=ready.tracks, point=point)
+    (found,) = filtered_states(estimate)
+    (series,) = ready.series
+    state = ready.passes.states(series, point)
+    known = np.isfinite(found.mean[:, 3])
+    # Neither before the first velocity nor after the gap.
+    assert not known[0]
+    assert not known[200]
+    assert known.sum() > 300
+    moved = found.mean[known]
+    places = [0, 1, 2, 3, 4, 5] if angle == "state" else [0, 1, 3, 4]
+    np.testing.assert_array_equal(moved[:, places], state[known])
+    np.linalg.cholesky(found.covariance[known][:, places][:, :, places])
+    if angle == "state":
+        return
+    truth = 0.5 * 0.4 * series.time[known]
+    assert np.abs(np.angle(np.exp(1j * (moved[:, 2] - truth)))).max() < 5e-3
+    assert np.abs(moved[:, 5] - 0.2).max() < 0.05
 
 
 @pytest.mark.parametrize("interval", [0.1, 0.2, 0.25])
