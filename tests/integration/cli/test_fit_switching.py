@@ -58,15 +58,11 @@ def test_the_model_with_the_switch_explains_the_recording(finished: tuple[Path, 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_without_the_switch_it_does_not(recording: Path, tmp_path: Path) -> None:
-    """The check says that the motion, or the strength of the flow, changes."""
-    found = answer(
-        here(
-            "fit", recording, *COARSE, "--flow-strength", "constant", "-o", tmp_path / "s", "--json"
-        )
-    )
+    """The steps alone do not show it: under the law of a floating body they come out right."""
+    how = (*COARSE, "--flow-strength", "constant", "--pressure-gradient", "on")
+    found = answer(here("fit", recording, *how, "-o", tmp_path / "s", "--json"))
     assert found["verdict"] == "does not explain"
-    changes = ("the motion changes", "the strength of the flow changes")
-    assert any(reason.startswith(changes) for reason in found["verdict_reasons"])
+    assert any("the motion changes" in reason for reason in found["verdict_reasons"])
 
 
 @pytest.mark.slow

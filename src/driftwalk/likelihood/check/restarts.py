@@ -178,11 +178,10 @@ def _starts(
 ) -> tuple[Start, Floats]:
     """Return pose and motion at the first sample of each section, and roots of covariances."""
     sure = np.isfinite(states.mean[:, 3])
-    parts = [
-        recorded_start(Track(*(axis[begin:end] for axis in track)), window=window)
-        for begin, end in zip(first, ends, strict=True)
-    ]
-    mean = np.where(sure[:, None], states.mean, np.array(parts))
+    mean = states.mean.copy()
+    for k in np.flatnonzero(~sure):
+        part = Track(*(axis[first[k] : ends[k]] for axis in track))
+        mean[k] = np.array(recorded_start(part, window=window))
     values, vectors = np.linalg.eigh(np.where(sure[:, None, None], states.covariance, 0.0))
     root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
     return Start(*mean.T), root

@@ -9,7 +9,7 @@ fitted, and closed again where nothing comes of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -231,12 +231,7 @@ class LawSearch:
 
     def _from_afar(self, points: Sequence[Point], weights: Weights) -> Mode | None:
         """Return the mode from the first of some points from which a search converges."""
-        mode = None
-        for point in points:
-            mode = self.search.find_from_afar(point, weights) or mode
-            if mode is not None and mode.converged:
-                break
-        return mode
+        return _first_converged(self.search.find_from_afar(point, weights) for point in points)
 
     def _alone(self, mode: Mode, *, floating: bool) -> LawResult:
         evidence = {"floating" if floating else "paper": evidence_of(mode, self.search.prior)}
@@ -299,8 +294,8 @@ class LawSearch:
         mode = found.mode
         fixed = {name: value for name, value in mode.point.fixed.items() if name not in FLOATING}
         fixed |= {} if found.floating else FLOATING
-        starts_of_it = (starts.paper,) if found.floating else starts.floating
-        points = [replace(one, opened=mode.point.opened, fixed=fixed) for one in starts_of_it]
+        tries = (starts.paper,) if found.floating else starts.floating
+        points = [replace(one, opened=mode.point.opened, fixed=fixed) for one in tries]
         rival = self._from_afar(points, mode.weights)
         return rival if rival is not None and rival.converged else None
 
@@ -386,11 +381,17 @@ def _mode_in(
     tries = [(point, weights) for point in starts]
     if near is not None:
         tries.append((near.point, near.weights))
-    mode = None
-    for point, known in tries:
-        mode = begin.find(point, known) or mode
-        if mode is not None and mode.converged:
-            return mode
-    if mode is not None:
+    mode = _first_converged(begin.find(point, known) for point, known in tries)
+    if mode is not None and not mode.converged:
         mode = begin.find(mode.point, mode.weights, held=FROM_NEAR)
     return mode if mode is not None and mode.converged else few
+
+
+def _first_converged(found: Iterable[Mode | None]) -> Mode | None:
+    """Return the first mode that has converged, else the last one; nothing where there is none."""
+    mode = None
+    for one in found:
+        mode = one or mode
+        if mode is not None and mode.converged:
+            break
+    return mode
