@@ -306,7 +306,8 @@ def card(one: Estimate) -> dict[str, Any]:
     scale, unit = (number_of.factor, number_of.shown) if number_of.shown else (1.0, number_of.unit)
     value, low, high = (scale * v for v in (one.value, *(one.ends or (math.nan, math.nan))))
     note = number_of.note or one.after.removeprefix(", ") or None
-    if one.unknown:
+    known = one.determined and not one.unknown
+    if not known:
         note = NOT_DETERMINED
     elif one.stated:
         note = f"stated; {note}"
@@ -316,7 +317,7 @@ def card(one: Estimate) -> dict[str, Any]:
     closed = not one.stated and math.isfinite(low) and math.isfinite(high)
     return figure(
         number_of.words.removesuffix(number_of.symbol).rstrip(),
-        None if one.unknown else value,
+        value if known else None,
         unit or "1",
         symbol=number_of.symbol,
         note=note,

@@ -108,6 +108,8 @@ class Number:
         terminal shows mm and mN.
     note : str
         What else a page says of it.
+    widest : float
+        Width of an interval above which the number is not determined.
     """
 
     name: str
@@ -116,6 +118,7 @@ class Number:
     symbol: str = ""
     shown: str = ""
     note: str = ""
+    widest: float = math.inf
 
     @property
     def key(self) -> str:

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from driftwalk.cli.terminal.output import print_parts, print_places, print_row
+from driftwalk.page.parts import card
 from driftwalk.schema.answers.parts import Row, Table, estimates, origin
 
 
@@ -37,6 +38,21 @@ def test_an_estimate_is_a_row_in_the_units_of_a_reader(capsys: pytest.CaptureFix
         "stochastic force σ_F   not determined by this recording",
         "tracking noise         2.000e-05 mm   95 % interval 1.000e-05 to 4.000e-05",
         "swim speed             0.05000 m/s   no interval without a bootstrap",
+    ]
+
+
+def test_a_share_of_hidden_drag_known_too_loosely_is_not_printed_as_a_number() -> None:
+    interval = ("parameter", "bound"), [[0.14, 0.57]]
+    names = {"parameter": ["hidden_face_drag_share"], "unit": ("parameter", ["1"])}
+    loose = xr.Dataset({"estimate": ("parameter", [0.35]), "interval": interval}, names)
+    narrow = loose.assign(interval=(interval[0], [[0.25, 0.57]]))
+    assert [one.text for found in (loose, narrow) for one in estimates(found)] == [
+        "not determined (0.1400 to 0.5700)",
+        "0.3500   interval 0.2500 to 0.5700",
+    ]
+    assert [card(one)["value"] for found in (loose, narrow) for one in estimates(found)] == [
+        None,
+        0.35,
     ]
 
 

@@ -194,6 +194,7 @@ def estimates(found: xr.Dataset) -> list[Estimate]:
             # σ_F means nothing without its interval.
             after = f", redrawn every {1e3 * float(found['force_interval']):g} ms"
         known = "determined" not in found or bool(found["determined"].values[at])
+        known &= ends is None or ends[1] - ends[0] <= number.widest
         value = float(found["estimate"].values[at])
         made.append(Estimate(number, value, ends, confidence, after, known))
     return made
