@@ -173,8 +173,38 @@ def dense_filter(
     rows |= {"whitened": [], "jacobian": []}
     s = P = M = None
     last, outliers = -np.inf, 0
-    # After a gap, and no sample has given a velocity since: nothing drags, and no error counts.
-    restarted = False
+    # After a gap or a contact, and no sample has given a velocity since: nothing drags, and no error
+    # counts. The sample that gives it gives that of `undragged` [s] before.
+    restarted, undragged = False, 0.0
+
+    def kicked(
+        s: Floats, M: Floats, covariance: Floats, h: float, k: int, share: float, acts: float
+    ) -> tuple[Floats, ...]:
+        """Return s and M after the drag of a time h; the kick, W and what its bend adds."""
+        options: dict[str, Any] = {"orientation": orientation}
+        weights = strengths_at(strength, k, share)
+        coefficients = np.tensordot(weights, layers, 1)
+        if d == 2:
+            options |= {
+                name: np.interp(share, [0, 1], track[name][k - 1 : k + 1])
+                for name in ("theta", "omega")
+            }
+        found = mean_drag(coefficients, s, covariance, **options)
+        found = {name: acts * one for name, one in found.items()}
+        W = np.linalg.inv(eye - h / 2 * found["by_velocity"])
+        kick = np.eye(2 * d)
+        kick[d:] += h * W @ np.hstack([found["by_position"], found["by_velocity"]])
+        by_parameters = np.hstack(
+            [
+                *(w * found["by_coefficients"].reshape(d, -1) for w in weights),
+                found["acceleration"][:, None],
+            ]
+        )
+        M = kick @ M
+        M[d:] += h * W @ by_parameters
+        bent = acts * bend_covariance(coefficients, s, covariance, **options)
+        return s + np.concatenate([still, h * W @ found["acceleration"]]), M, kick, W, bent
+
     for k in range(time.size):
         e, S, used = np.full(d, np.nan), np.full((d, d), np.nan), False
         whitened, jacobian = np.zeros(d), np.zeros((d, width))
@@ -185,41 +215,23 @@ def dense_filter(
         if s is not None:
             steps = max(1, int(np.ceil(interval / largest - 1e-9)))
             h = interval / steps
+            if undragged:
+                s, M, kick = kicked(s, M, P, undragged, k, 0.0, 1.0)[:3]
+                P, undragged = kick @ P @ kick.T, 0.0
             half[:d, d:] = h / 2 * eye
             for i in range(steps):
                 share = (i + 0.5) / steps
                 s, P, M = half @ s, half @ P @ half.T, half @ M
                 middle = P + scipy.linalg.block_diag(0 * eye, h / 2 * intensity)
-                options = {"orientation": orientation}
-                weights = strengths_at(strength, k, share)
-                coefficients = np.tensordot(weights, layers, 1)
-                if d == 2:
-                    options |= {
-                        name: np.interp(share, [0, 1], track[name][k - 1 : k + 1])
-                        for name in ("theta", "omega")
-                    }
                 acts = float(not restarted)
-                found = mean_drag(coefficients, s, middle, **options)
-                found = {name: acts * one for name, one in found.items()}
-                bent = bend_covariance(coefficients, s, middle, **options)
-                spread = intensity + acts * interval * bent
-                W = np.linalg.inv(eye - h / 2 * found["by_velocity"])
-                kick = np.eye(2 * d)
-                kick[d:] += h * W @ np.hstack([found["by_position"], found["by_velocity"]])
-                by_parameters = np.hstack(
-                    [
-                        *(w * found["by_coefficients"].reshape(d, -1) for w in weights),
-                        found["acceleration"][:, None],
-                    ]
-                )
-                s = s + np.concatenate([still, h * W @ found["acceleration"]])
-                M = kick @ M
-                M[d:] += h * W @ by_parameters
+                s, M, kick, W, bent = kicked(s, M, middle, h, k, share, acts)
+                spread = intensity + interval * bent
                 growth = np.kron([[h**3 / 3, h**2 / 2], [h**2 / 2, h]], W @ spread @ W.T)
                 s, M = half @ s, half @ M
                 P = half @ kick @ P @ kick.T @ half.T + growth
             if track["excluded"][k]:
                 P = P + scipy.linalg.block_diag(0 * eye, unknown)
+                restarted = True
         value, R = sample_of(track, k, s, noise)
         there = not np.isnan(value[:2]).any()
         if s is not None and there:
@@ -234,12 +246,14 @@ def dense_filter(
             if outliers == 3:
                 outliers = 0
                 s, P = np.concatenate([value, s[d:]]), scipy.linalg.block_diag(noise, unknown)
+                undragged = 0.0
                 M = np.zeros((2 * d, width))
             elif outliers == 0:
                 K = np.linalg.solve(S, observe @ P).T
                 keep = np.eye(2 * d) - K @ observe
                 s, P, M = s + K @ e, keep @ P @ keep.T + K @ R @ K.T, keep @ M
-                restarted = restarted and bool(track["excluded"][k])
+                if restarted and not track["excluded"][k]:
+                    restarted, undragged = False, (time[k] - last) / 2
         elif s is None and not np.isnan(value).any():
             s, P, outliers = (
                 np.concatenate([value, still]),

@@ -127,7 +127,9 @@ def test_without_correlation_it_is_that_of_the_filters(angle: str, memory: float
     assert driven.mean() > 0.5
     velocities = slice(errors.innovation.shape[2], errors.innovation.shape[2] + 2)
     np.testing.assert_allclose(
-        shared[driven][:, velocities, velocities], errors.noise[driven][:, velocities, velocities]
+        shared[driven][:, velocities, velocities],
+        errors.noise[driven][:, velocities, velocities],
+        atol=1e-20,
     )
 
 

@@ -121,7 +121,7 @@ private:
   }
 
   void open(const Sample& found, const double* velocity) {
-    state_ = {{}, {}, state_.seen, true, 0, state_.next, state_.restarted};
+    state_ = {{}, {}, state_.seen, true, 0, state_.next, state_.restarted, 0};
     for (int a = 0; a < D; ++a) {
       state_.mean[a] = found.value[a];
       state_.mean[a + D] = velocity[a];
@@ -141,6 +141,9 @@ private:
 
   void predict(std::int64_t k) {
     const double interval = track_.time[k] - track_.time[k - 1];
+    if (state_.undragged > 0) {
+      make_up_for_drag(k);
+    }
     const double wanted = __builtin_ceil(interval / problem_.largest_step - 1e-9);
     const int steps = wanted > 1 ? static_cast<int>(wanted) : 1;
     const double h = interval / steps;
@@ -155,7 +158,33 @@ private:
       for (int a = 0; a < D; ++a) {
         state_.covariance[a + D][a + D] += unknown_velocity(a) * unknown_velocity(a);
       }
+      state_.restarted = true;
     }
+  }
+
+  // Two samples give the velocity between them. From there to the second the drag acts, too.
+  void make_up_for_drag(std::int64_t k) {
+    Square<2 * D> covariance;
+    for (int a = 0; a < 2 * D; ++a) {
+      for (int b = 0; b < 2 * D; ++b) {
+        covariance[a][b] = state_.covariance[a][b];
+      }
+    }
+    const double h = state_.undragged;
+    const DragResponse<D> drag = response_at(covariance, k, 0);
+    const Kick<D> kick = make_kick(drag, h);
+    for (int a = 0; a < D; ++a) {
+      state_.mean[a + D] += kick.change[a];
+    }
+    kick_covariance(state_, kick);
+    if (out_.errors != nullptr) {
+      carry_errors(kick, 0);
+    }
+    if (with_sensitivities()) {
+      sensitivity_.drift_and_kick(0, kick);
+      sensitivity_.add_flow(scratch_, drag, problem_.flow.columns, kick, h);
+    }
+    state_.undragged = 0;
   }
 
   // A step h; `share` says where its middle is between the samples k - 1 and k.
@@ -308,8 +337,8 @@ private:
         innovation_of(state_, found.value, found.variance, problem_.time_variance);
     const bool fits = e.chi_squared() < outlier_chi_squared;
     write_innovation(row, e);
-    // The first innovation after a gap tells of the velocity at its end alone, of which no law is
-    // assumed: counted, it would ask for the drag that makes any velocity the water's.
+    // The first innovation after a gap or a contact tells of the velocity at its end alone, of which
+    // no law is assumed: counted, it would ask for the drag that makes any velocity the water's.
     write_likelihood(row, fits && !excluded && !state_.restarted ? &e : nullptr);
     if (!fits && !excluded) {
       if (++state_.outliers <= most_outliers) {
@@ -328,7 +357,10 @@ private:
       return;
     }
     state_.outliers = 0;
-    state_.restarted = state_.restarted && excluded;
+    if (state_.restarted && !excluded) {
+      state_.restarted = false;
+      state_.undragged = (track_.time[k] - state_.seen) / 2;
+    }
     const Gain<D, F> gain = gain_of(state_, e);
     update(state_, e, gain);
     if (with_sensitivities()) {

@@ -107,7 +107,9 @@ struct FilterState {
   bool open;         // whether there is a state at all
   int outliers;      // samples in a row that were no noise
   std::int64_t next; // the sample that comes next
-  bool restarted;    // after a gap, and no sample has given a velocity since
+  // After a gap or a contact with the wall, and no sample has given a velocity since.
+  bool restarted;
+  double undragged; // the velocity is of so long before the state, and no drag acted since [s]
 };
 
 // The part of one strip in d(acceleration)/d(coefficients).

@@ -71,7 +71,12 @@ def innovations_of(estimate: Estimate) -> list[Innovations]:
         # Coordinates come first, as many as velocities.
         velocity = before[:, before.shape[1] // 2 :]
         speed[1:] = np.hypot(flow[0] - velocity[:, 0], flow[1] - velocity[:, 1])
-        outlier = np.isfinite(white).all(axis=1) & ~used & (series.excluded == 0)
+        there = np.isfinite(white).all(axis=1)
+        # The first error after a gap or a contact gives the velocity; it is used by nothing else.
+        known = np.flatnonzero(there | series.begins)
+        first = np.zeros_like(there)
+        first[known[1:]] = series.begins[known[:-1]]
+        outlier = there & ~used & ~first & (series.excluded == 0)
         counted = used & series.settled
         white = np.where(counted[:, None], white, 0.0)
         found.append(Innovations(series, white, counted, outlier, speed))

@@ -80,6 +80,11 @@ class Series:
         return np.diff(self.time) > FILTER.longest_gap_s
 
     @property
+    def begins(self) -> Bools:
+        """At which samples the velocity is not known: after a gap or a contact, shape (n,)."""
+        return np.concatenate([[True], self.gaps]) | (self.excluded != 0)
+
+    @property
     def settled(self) -> Bools:
         """Which samples are not the first ones of a stretch, shape (n,).
 
@@ -87,8 +92,7 @@ class Series:
         its next errors are far smaller than it expects, and places where it often begins, which are
         those at the wall, would seem to have less noise.
         """
-        begins = np.concatenate([[True], self.gaps])
-        begins |= self.excluded != 0
+        begins = self.begins
         settled = ~begins
         for later in range(1, FILTER.settling_samples + 1):
             settled[later:] &= ~begins[:-later]
@@ -451,9 +455,8 @@ def usable_intervals(series: Sequence[Series]) -> int:
     """Return the number of intervals that are not left out, no gaps, and not next after one."""
     count = 0
     for one in series:
-        left_out = one.gaps | (one.excluded[1:] != 0)
-        left_out[1:] |= one.gaps[:-1]
-        count += int(np.count_nonzero(~left_out))
+        begins = one.begins[1:]
+        count += int(np.count_nonzero(~begins)) - int(np.count_nonzero(begins[:-1] & ~begins[1:]))
     return count
 
 
