@@ -7,7 +7,7 @@ Only the mean drag is that of the core, which is checked by itself.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -146,6 +146,47 @@ def strengths_at(strength: Floats | None, k: int, share: float) -> Floats:
     return (1 - share) * strength[:, k - 1] + share * strength[:, k]
 
 
+class World(NamedTuple):
+    """What drags a block along a track."""
+
+    track: dict[str, Any]
+    layers: Floats
+    strength: Floats | None
+    orientation: str
+    acts: float = 1.0
+
+
+def kicked(
+    world: World, s: Floats, M: Floats, covariance: Floats, h: float, k: int, share: float
+) -> tuple[Floats, ...]:
+    """Return s and M after the drag of a time h; the kick, W and what its bend adds."""
+    track, d = world.track, s.size // 2
+    eye, still = np.eye(d), np.zeros(d)
+    options: dict[str, Any] = {"orientation": world.orientation}
+    weights = strengths_at(world.strength, k, share)
+    coefficients = np.tensordot(weights, world.layers, 1)
+    if d == 2:
+        options |= {
+            name: np.interp(share, [0, 1], track[name][k - 1 : k + 1])
+            for name in ("theta", "omega")
+        }
+    found = mean_drag(coefficients, s, covariance, **options)
+    found = {name: world.acts * one for name, one in found.items()}
+    W = np.linalg.inv(eye - h / 2 * found["by_velocity"])
+    kick = np.eye(2 * d)
+    kick[d:] += h * W @ np.hstack([found["by_position"], found["by_velocity"]])
+    by_parameters = np.hstack(
+        [
+            *(w * found["by_coefficients"].reshape(d, -1) for w in weights),
+            found["acceleration"][:, None],
+        ]
+    )
+    M = kick @ M
+    M[d:] += h * W @ by_parameters
+    bent = world.acts * bend_covariance(coefficients, s, covariance, **options)
+    return s + np.concatenate([still, h * W @ found["acceleration"]]), M, kick, W, bent
+
+
 def dense_filter(
     track: dict[str, Any],
     layers: Floats,
@@ -173,38 +214,10 @@ def dense_filter(
     rows |= {"whitened": [], "jacobian": []}
     s = P = M = None
     last, outliers = -np.inf, 0
-    # After a gap or a contact, and no sample has given a velocity since: nothing drags, and no error
-    # counts. The sample that gives it gives that of `undragged` [s] before.
+    # After a gap or a contact, and no sample has given a velocity since: nothing drags, and no
+    # error counts. The sample that gives it gives that of `undragged` [s] before.
     restarted, undragged = False, 0.0
-
-    def kicked(
-        s: Floats, M: Floats, covariance: Floats, h: float, k: int, share: float, acts: float
-    ) -> tuple[Floats, ...]:
-        """Return s and M after the drag of a time h; the kick, W and what its bend adds."""
-        options: dict[str, Any] = {"orientation": orientation}
-        weights = strengths_at(strength, k, share)
-        coefficients = np.tensordot(weights, layers, 1)
-        if d == 2:
-            options |= {
-                name: np.interp(share, [0, 1], track[name][k - 1 : k + 1])
-                for name in ("theta", "omega")
-            }
-        found = mean_drag(coefficients, s, covariance, **options)
-        found = {name: acts * one for name, one in found.items()}
-        W = np.linalg.inv(eye - h / 2 * found["by_velocity"])
-        kick = np.eye(2 * d)
-        kick[d:] += h * W @ np.hstack([found["by_position"], found["by_velocity"]])
-        by_parameters = np.hstack(
-            [
-                *(w * found["by_coefficients"].reshape(d, -1) for w in weights),
-                found["acceleration"][:, None],
-            ]
-        )
-        M = kick @ M
-        M[d:] += h * W @ by_parameters
-        bent = acts * bend_covariance(coefficients, s, covariance, **options)
-        return s + np.concatenate([still, h * W @ found["acceleration"]]), M, kick, W, bent
-
+    world = World(track, layers, strength, orientation)
     for k in range(time.size):
         e, S, used = np.full(d, np.nan), np.full((d, d), np.nan), False
         whitened, jacobian = np.zeros(d), np.zeros((d, width))
@@ -216,15 +229,15 @@ def dense_filter(
             steps = max(1, int(np.ceil(interval / largest - 1e-9)))
             h = interval / steps
             if undragged:
-                s, M, kick = kicked(s, M, P, undragged, k, 0.0, 1.0)[:3]
+                s, M, kick = kicked(world, s, M, P, undragged, k, 0.0)[:3]
                 P, undragged = kick @ P @ kick.T, 0.0
             half[:d, d:] = h / 2 * eye
             for i in range(steps):
                 share = (i + 0.5) / steps
                 s, P, M = half @ s, half @ P @ half.T, half @ M
                 middle = P + scipy.linalg.block_diag(0 * eye, h / 2 * intensity)
-                acts = float(not restarted)
-                s, M, kick, W, bent = kicked(s, M, middle, h, k, share, acts)
+                dragging = world._replace(acts=float(not restarted))
+                s, M, kick, W, bent = kicked(dragging, s, M, middle, h, k, share)
                 spread = intensity + interval * bent
                 growth = np.kron([[h**3 / 3, h**2 / 2], [h**2 / 2, h]], W @ spread @ W.T)
                 s, M = half @ s, half @ M
@@ -238,10 +251,8 @@ def dense_filter(
             e, S = value - observe @ s, observe @ P @ observe.T + R
             outlier = e @ np.linalg.solve(S, e) >= 40
             used = not outlier and not track["excluded"][k] and not restarted
-            if used:
-                L = np.linalg.cholesky(S)
-                whitened = np.linalg.solve(L, e)
-                jacobian = np.linalg.solve(L, observe @ M)
+            L = np.linalg.cholesky(S)
+            whitened, jacobian = (used * np.linalg.solve(L, one) for one in (e, observe @ M))
             outliers = outliers + 1 if outlier and not track["excluded"][k] else 0
             if outliers == 3:
                 outliers = 0

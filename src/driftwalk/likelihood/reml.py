@@ -34,6 +34,8 @@ class RemlPolicy(NamedTuple):
     near: float = 1.0
     """A first guess within this many standard deviations of the likelihood's maximum is the
     minimum. Chosen by hand."""
+    apart: float = 0.1
+    """Profiles nearer than this many standard deviations tell the same. Chosen by hand."""
     intensity_step: float = 0.05
     """Change of ln q for the slope of the determinant. Chosen by hand."""
     most_std_ratio: float = 4.0
@@ -117,6 +119,8 @@ def restricted_drag(search: ModeSearch, mode: Mode, *, intensity: bool = True) -
 
     def add_profile(log_drag: float) -> None:
         near = min(found, key=lambda one: abs(one.log_drag - log_drag))
+        if abs(near.log_drag - log_drag) < REML.apart * sd:
+            return
         guess = near.coefficients + slopes[:drag] * (log_drag - near.log_drag)
         found.append(profile_at(search, mode, log_drag, guess))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from fit_worlds import coarse_study, fitted, recording
 import driftwalk as dw
 from driftwalk.conditions import estimated_study
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood import angle_consistency, compare_laws, estimate_wall, judge_fit
+from driftwalk.likelihood import angle_consistency, compare_laws, estimate_wall, judge_fit, reml
 from driftwalk.likelihood.check import run
 from driftwalk.likelihood.contacts import estimate as wall
 from driftwalk.likelihood.filter.parameters import Point
@@ -24,6 +25,7 @@ from driftwalk.likelihood.interval_inflation import parameter_facts, strips_erro
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
+from driftwalk.likelihood.prior import Weights
 from driftwalk.notebook.result import answer_lines
 from driftwalk.page.sections.fit import fit_summary
 from driftwalk.schema import build_trajectory
@@ -49,6 +51,30 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rows = np.column_stack([one["time"], one["x"], one["y"], one["theta"]])
     np.savetxt(path, rows, delimiter=",", header="t,x,y,theta", comments="")
     return path
+
+
+def test_a_profile_is_not_computed_twice_at_one_point(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The first guess of the minimum, two standard deviations down, is where the second profile is.
+    A parabola and a straight line have their minimum at -sd^2 times the line's slope."""
+    sd = 0.1
+
+    def profile(_: Any, mode: Mode, log_drag: float, coefficients: np.ndarray) -> reml.Profile:
+        slope, determinant = log_drag / sd**2, 2.0 * log_drag / sd
+        return reml.Profile(log_drag, 0.0, slope, determinant, coefficients, reml.Pull())
+
+    monkeypatch.setattr(reml, "profile_at", profile)
+    point = Point(np.zeros((2, 1, 1)), log_drag=0.0, log_intensity=-10.0, log_noise=-8.0)
+    mode = Mode(point, Weights(1.0, 1.0), np.diag([1.0, 1.0, sd**2, 1.0, 1.0]), 1, 1, True, 0.0)
+    outline = SimpleNamespace(disc_radius_m=None)
+    search: Any = SimpleNamespace(passes=SimpleNamespace(body=SimpleNamespace(outline=outline)))
+    found = reml.restricted_drag(search, mode, intensity=False)
+    assert [one.log_drag / sd for one in found.profiles] == pytest.approx(
+        [-4.0, -2.0, 0.0], abs=0.01
+    )
+    assert found.point.log_drag == pytest.approx(-2.0 * sd, rel=1e-3)
+    assert found.log_drag_std == pytest.approx(sd)
 
 
 @pytest.mark.slow

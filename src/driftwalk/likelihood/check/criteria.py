@@ -200,10 +200,10 @@ def tail_criterion(white: WhitenessTests, components: tuple[str, ...]) -> Criter
         "tails",
         min(1.0, len(components) * float(white.kurtosis_p_value[worst])),
         f"the errors of prediction are not normal: excess kurtosis of {components[worst]} "
-        f"{white.excess_kurtosis[worst]:+.2f}, expected 0 ± {white.kurtosis_std:.2f} "
+        f"{white.excess_kurtosis[worst]:+.2f}, expected 0 ± {white.kurtosis_std[worst]:.2f} "
         f"({in_percent(white.tail_share[worst], decimals=2)} beyond 3 sd, expected 0.27 %): the "
         "force comes in bursts, or the tracker slips",
-        detectable_sigmas(0.5 * VERDICT.level / len(components)) * white.kurtosis_std,
+        detectable_sigmas(0.5 * VERDICT.level / len(components)) * white.kurtosis_std[worst],
         size=abs(float(white.excess_kurtosis[worst])),
         least=LEAST.kurtosis,
         measure="the excess kurtosis is {:.2f}, up to {:.1f}",

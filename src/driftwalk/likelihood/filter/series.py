@@ -82,7 +82,7 @@ class Series:
     @property
     def begins(self) -> Bools:
         """At which samples the velocity is not known: after a gap or a contact, shape (n,)."""
-        return np.concatenate([[True], self.gaps]) | (self.excluded != 0)
+        return np.asarray(np.concatenate([[True], self.gaps]) | (self.excluded != 0))
 
     @property
     def settled(self) -> Bools:

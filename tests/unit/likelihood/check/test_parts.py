@@ -181,6 +181,38 @@ def test_autocorrelation_with_gaps_by_brute_force() -> None:
         assert found.std[:, lag - 1] == pytest.approx(1.0 / np.sqrt(len(pairs)))
 
 
+def test_one_passage_does_not_reject_a_model_that_is_right_elsewhere() -> None:
+    """Of large errors twelve in a row count as one; thirty far from each other are found."""
+    noise = np.random.default_rng(31).normal(size=(6000, 2))
+    in_a_row, apart = noise.copy(), noise.copy()
+    in_a_row[2430:2442, 1] += 5.0
+    apart[100::200, 1] += 5.0
+    one, many = (
+        whiteness_tests([errors_of_noise(white)], nothing_fitted()) for white in (in_a_row, apart)
+    )
+    assert one.excess_kurtosis[1] > 0.5
+    assert one.kurtosis_p_value[1] > 0.1
+    assert many.kurtosis_p_value[1] < 1e-4
+    assert one.p_value > 0.1 > 1e-3 > chi2.sf((one.autocorrelation**2).sum() * 6000, 40)
+    # By brute force: the scatter of the sums of 10 s about what their samples should hold.
+    white = in_a_row[:, 1] / in_a_row[:, 1].std()
+    for lag, found in ((1, one.std[1, 0]), (20, one.std[1, 19])):
+        products = [white[k] * white[k - lag] for k in range(lag, 6000)]
+        by_cluster = [
+            products[max(first - lag, 0) : first + 100 - lag] for first in range(0, 6000, 100)
+        ]
+        off = [sum(part) - len(part) * np.mean(products) for part in by_cluster]
+        assert found == pytest.approx(np.sqrt(np.sum(np.square(off))) / len(products), rel=1e-2)
+
+
+def test_errors_that_are_correlated_everywhere_are_found() -> None:
+    """With 0.1 at a lag of one sample in 6000; the errors of clusters are those of white noise."""
+    noise = np.random.default_rng(32).normal(size=(6001, 2))
+    found = whiteness_tests([errors_of_noise(noise[1:] + 0.1 * noise[:-1])], nothing_fitted())
+    assert found.p_value < 1e-6
+    assert found.std[:, 0] == pytest.approx(1.0 / np.sqrt(5999))
+
+
 def test_lags_without_a_pair_take_no_degree_of_freedom() -> None:
     white = np.random.default_rng(12).normal(size=(400, 2))
     found = whiteness_tests([errors_of_noise(white, np.arange(400) % 2 == 0)], nothing_fitted())
