@@ -190,10 +190,6 @@ def fit_motion(
     require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, reason)
     with solved(reason):
         innovations = passes.innovations(restricted.point)
-    counted = [
-        (white, used & one.settled)
-        for (white, used), one in zip(innovations, ready.series, strict=True)
-    ]
     turning: dict[str, Any] = {}
     # How the block's spin goes with the water's, where orientations and one flow are.
     if ready.angle != "none" and ready.intervals.steady:
@@ -221,7 +217,7 @@ def fit_motion(
         **({"flow_modes_unsettled": modes.unsettled} if modes.unsettled else {}),
         **turning,
         **stirring.facts,
-        **whiteness_of(counted)._asdict(),
+        **whiteness_of(innovations)._asdict(),
         **ready.facts,
         **_search_facts(law, restricted),
         **_agreement(ready, law.mode, restricted),

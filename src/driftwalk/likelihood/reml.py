@@ -146,29 +146,31 @@ def restricted_drag(search: ModeSearch, mode: Mode, *, intensity: bool = True) -
         point, log_drag=log_drag, coefficients=coefficients.reshape(start.coefficients.shape)
     )
     if intensity:
-        point = _with_restricted_intensity(search, mode, point, found)
+        point = _with_restricted_intensity(search, mode, point)
     return Restricted(point, std, found, has_minimum=True)
 
 
-def _with_restricted_intensity(
-    search: ModeSearch, mode: Mode, point: Point, found: list[Profile]
-) -> Point:
+def _with_restricted_intensity(search: ModeSearch, mode: Mode, point: Point) -> Point:
     """Return the point after one Newton step in ln q of each flow on the restricted criterion.
 
     The other noises go along the ridge of the likelihood; their own slopes, and the slope of
     the lever, are too small to matter.
     """
-    at, values = zip(*((one.log_drag, one.half_log_determinant) for one in found), strict=True)
-    here = float(np.interp(point.log_drag, at, values))
+
+    def determinant(at: Point) -> float:
+        moved = replace(mode, point=at)
+        found = profile_at(search, moved, point.log_drag, point.coefficients.ravel())
+        return found.half_log_determinant
+
+    here = determinant(point)
     drag = point.coefficients.size
     with_drag = mode.covariance[drag + 1 :, drag]
     step = np.zeros(drag + 1 + with_drag.size)
     for row, (name, value) in enumerate(point.extras.items()):
         if name != "log_intensity" and name not in INTENSITIES:
             continue
-        moved = replace(mode, point=point.with_extra(name, value + REML.intensity_step))
-        there = profile_at(search, moved, point.log_drag, point.coefficients.ravel())
-        slope = (there.half_log_determinant - here) / REML.intensity_step
+        there = determinant(point.with_extra(name, value + REML.intensity_step))
+        slope = (there - here) / REML.intensity_step
         # Of the noises with this ln q, at this C_d.
         column = mode.covariance[drag + 1 :, drag + 1 + row] - with_drag * (
             with_drag[row] / mode.covariance[drag, drag]

@@ -68,7 +68,7 @@ def test_a_law_searched_on_samples_further_apart_gives_the_same_fit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Each ends within 0.15 standard deviations of the mode of all samples."""
-    recording = driven(3, 90.0, {}, interval=0.02)
+    recording = driven(1, 90.0, {}, interval=0.02)
     study = coarse_study()
     found = fit_motion(recording, study)
     monkeypatch.setattr(newton, "EXCERPT", EXCERPT._replace(interval_s=0.0))

@@ -72,14 +72,13 @@ def innovations_of(estimate: Estimate) -> list[Innovations]:
         velocity = before[:, before.shape[1] // 2 :]
         speed[1:] = np.hypot(flow[0] - velocity[:, 0], flow[1] - velocity[:, 1])
         there = np.isfinite(white).all(axis=1)
-        # The first error after a gap or a contact gives the velocity; it is used by nothing else.
+        # The first error after a gap or a contact gives the velocity, and is no mistake.
         known = np.flatnonzero(there | series.begins)
         first = np.zeros_like(there)
         first[known[1:]] = series.begins[known[:-1]]
         outlier = there & ~used & ~first & (series.excluded == 0)
-        counted = used & series.settled
-        white = np.where(counted[:, None], white, 0.0)
-        found.append(Innovations(series, white, counted, outlier, speed))
+        white = np.where(used[:, None], white, 0.0)
+        found.append(Innovations(series, white, used, outlier, speed))
     return found
 
 

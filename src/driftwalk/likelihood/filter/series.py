@@ -39,9 +39,8 @@ class FilterPolicy(NamedTuple):
     """Mean length of the stretches between gaps below which C_d is not settled [s]. Chosen by hand:
     a few times as long as a block remembers its velocity. At 2 s C_d came out 23 % too large."""
     settling_samples: int = 3
-    """Samples after the first one of a stretch until the filter knows the velocity. Its innovations
-    are a hundredth to four fifths of what it expects there; when they counted, six of 42 recordings
-    of the model itself were rejected."""
+    """Samples after a frame that is missing that are left out where other explanations of an error
+    are tried: until then a wrong place counts in the filter's velocity. Chosen by hand."""
     pooled_s: float = 0.1
     """Derivatives of samples within this time [s] hardly differ: their products are made of their
     mean. Measured at 100 Hz: docs/explanation/likelihood.md."""
@@ -83,20 +82,6 @@ class Series:
     def begins(self) -> Bools:
         """At which samples the velocity is not known: after a gap or a contact, shape (n,)."""
         return np.asarray(np.concatenate([[True], self.gaps]) | (self.excluded != 0))
-
-    @property
-    def settled(self) -> Bools:
-        """Which samples are not the first ones of a stretch, shape (n,).
-
-        Where the filter begins, and after a contact with the wall, it allows for any velocity. So
-        its next errors are far smaller than it expects, and places where it often begins, which are
-        those at the wall, would seem to have less noise.
-        """
-        begins = self.begins
-        settled = ~begins
-        for later in range(1, FILTER.settling_samples + 1):
-            settled[later:] &= ~begins[:-later]
-        return settled
 
     @property
     def pooled(self) -> int:

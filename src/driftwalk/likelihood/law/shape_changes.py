@@ -191,7 +191,7 @@ def _highest(power: Floats) -> list[int]:
 
 def _cells(series: Series, score: Scores, size: float) -> list[Integers]:
     """Return the samples that count in each cell, of the cells with enough of them."""
-    there = np.flatnonzero((score.squares > 0.0) & series.settled)
+    there = np.flatnonzero(score.squares > 0.0)
     corners = np.stack([np.floor(axis[there] / size) for axis in (series.y, series.x)])
     _, cell = np.unique(corners, axis=1, return_inverse=True)
     order = np.argsort(cell.ravel(), kind="stable")
