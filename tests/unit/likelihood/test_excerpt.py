@@ -89,7 +89,7 @@ def test_a_search_by_way_of_pieces_ends_where_one_of_the_whole_does(
     In every run the fit of the front page, of half an hour, begins with pieces.
     """
     study = coarse_study()
-    recording = driven(2, 1200.0, {})
+    recording = driven(1, 1200.0, {})
     found = fit_motion(recording, study)
     # Two steps without the noises, two with them, and what the last nat takes.
     assert int(found["iterations"]) <= 6
