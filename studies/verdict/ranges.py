@@ -10,7 +10,7 @@ SEEDS: Final = {
     "confirmation": 73_000,
     "confirmation-2": 74_000,
 }
-"""Choices may be made on the first alone; those that errors on the next two led to are named."""
+"""Choices may be made on the first. The README names those that errors on the next two led to."""
 
 RADIUS_M: Final = 0.15
 SIDE_M: Final = 0.03

@@ -359,3 +359,32 @@ def test_a_sample_far_away_does_no_harm():
     assert np.flatnonzero(got["used"] == 0).tolist() == [0, 30]
     assert np.isfinite(got["jacobian"]).all()
     assert np.isfinite(got["state"]).all()
+
+
+@pytest.mark.parametrize("orientation", ["given", "state"])
+def test_after_a_contact_the_drag_of_the_first_interval_is_made_up_for(orientation):
+    """In still water a block that goes face on has dv/dt = -k v^2: x = ln(1 + k v t) / k.
+
+    The sample after the contact says the velocity in the middle of its interval h. Without the drag
+    from there on the next error would be k v^2 h^2 / 2, with twice as much of it the opposite.
+    """
+    h, speed, contact = 0.1, 0.05, 20
+    time = h * np.arange(40)
+    still = np.zeros_like(WAVY)
+    weak = {"drag_coefficient": 0.05}
+    moving = np.array([0, 0, speed, 0])
+    decay = -mean_drag(still, moving, theta=0.0, omega=0.0, **weak)["acceleration"][0]
+    rate = decay / speed**2
+    track = {
+        "time": time,
+        "x": np.log1p(rate * speed * time) / rate - 0.1,
+        "y": np.zeros(40),
+        "theta": np.zeros(40),
+        "omega": np.zeros(40),
+        "excluded": (np.arange(40) == contact).astype(np.uint8),
+    }
+    exact = {"position_noise": 1e-7, "noise_intensity": 1e-8}
+    found = run_filter(track, still, orientation=orientation, **exact, **weak)
+    error = found["innovation"][contact + 2, 0]
+    slower = speed / (1 + rate * speed * time[contact])
+    assert abs(error) < 0.05 * rate * slower**2 * h**2 / 2

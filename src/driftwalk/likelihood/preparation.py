@@ -22,8 +22,8 @@ from driftwalk.likelihood.filter.series import (
     ORIENTED_SHARE,
     Series,
     body_of,
-    gaps_unsettled,
     series_of,
+    stretches_unsettled,
     usable_intervals,
     wall_intervals,
 )
@@ -144,7 +144,7 @@ class PreparedRecordings:
                 one.time, one.x, one.y, corners,
                 outline=outline, block=block, margin=0.5 * block.side_m,
             )  # fmt: skip
-            # An interval of 1.5 usual ones lacks a frame; the filter's velocity settles in three.
+            # An interval of 1.5 usual ones lacks a frame.
             gaps = np.flatnonzero(np.diff(one.time) > 1.5 * float(np.median(np.diff(one.time)))) + 1
             for later in range(FILTER.settling_samples + 1):
                 left_out[np.minimum(gaps + later, one.time.size - 1)] = True
@@ -160,9 +160,9 @@ class PreparedRecordings:
     def facts(self) -> dict[str, Any]:
         """Facts of a fit on its recordings."""
         many = self.recordings
-        gaps = gaps_unsettled(self.series)
+        gaps = stretches_unsettled(self.series)
         return {
-            **({"gaps_unsettled": gaps} if gaps else {}),
+            **({"stretches_unsettled": gaps} if gaps else {}),
             "wall_share": self.wall_share,
             "angle": self.angle if self.study.block.body().symmetry else NO_HEADING,
             "samples": self.samples,

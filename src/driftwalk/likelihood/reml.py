@@ -35,7 +35,7 @@ class RemlPolicy(NamedTuple):
     """A first guess within this many standard deviations of the likelihood's maximum is the
     minimum. Chosen by hand."""
     apart: float = 0.1
-    """Profiles nearer than this many standard deviations tell the same. Chosen by hand."""
+    """Profiles nearer than this many standard deviations say the same. Chosen by hand."""
     intensity_step: float = 0.05
     """Change of ln q for the slope of the determinant. Chosen by hand."""
     most_std_ratio: float = 4.0

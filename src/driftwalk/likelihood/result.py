@@ -51,7 +51,12 @@ WORDS: Final = (
     *("force_law", "force_law_stated", "drag_law", "drag_law_stated"),
 )
 """Facts in words, which are attributes."""
-REASONS: Final = ("law_unsettled", "flow_shape_change", "flow_modes_unsettled", "gaps_unsettled")
+REASONS: Final = (
+    "law_unsettled",
+    "flow_shape_change",
+    "flow_modes_unsettled",
+    "stretches_unsettled",
+)
 """The same where there is anything to say."""
 
 

@@ -171,8 +171,8 @@ def _on_the_data(
             "was more than 6 standard deviations from where the model predicted it; "
             "the fit describes only a part of the motion"
         )
-    if "gaps_unsettled" in facts:
-        yield facts["gaps_unsettled"]
+    if "stretches_unsettled" in facts:
+        yield facts["stretches_unsettled"]
     std = facts["drag_coefficient_relative_std"]
     wanted = facts.get("drag_coefficient_precision")
     if std > (wanted or LENGTH.usual_precision) and not facts.get("search_left", 0.0):

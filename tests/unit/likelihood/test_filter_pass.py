@@ -13,7 +13,7 @@ from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.difference_pairs import Pair
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
-from driftwalk.likelihood.filter.series import Series, gaps_unsettled, strength_of
+from driftwalk.likelihood.filter.series import Series, strength_of, stretches_unsettled
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.newton import inverse, limited, newton_step
 from driftwalk.likelihood.preparation import body_of, estimate_of, series_of
@@ -239,6 +239,16 @@ def test_errors_after_a_gap_and_a_contact_are_as_large_as_elsewhere() -> None:
         assert abs((white[some] ** 2).mean() - 1.0) < bound
 
 
+@pytest.mark.parametrize(("every", "free"), [(8, "0.7"), (17, "")])
+def test_short_flights_between_contacts_settle_nothing(
+    passes: Passes, every: int, free: str
+) -> None:
+    excluded = np.zeros(passes.series[0].time.size, dtype=np.uint8)
+    excluded[::every] = 1
+    said = stretches_unsettled([replace(passes.series[0], excluded=excluded)])
+    assert said.startswith(f"the block moves freely for {free} s") if free else said == ""
+
+
 def test_after_a_gap_two_samples_give_the_velocity_and_no_drag_does(
     passes: Passes, point: Point
 ) -> None:
@@ -258,8 +268,8 @@ def test_after_a_gap_two_samples_give_the_velocity_and_no_drag_does(
     for one in found:
         assert one["used"][gap : gap + 2].tolist() == [0, 0]
     # Two stretches of three seconds; without the gap, one.
-    assert "1 in all, and 2.9 s" in gaps_unsettled([series])
-    assert gaps_unsettled([passes.series[0]]) == ""
+    assert "1 in all, and 2.9 s" in stretches_unsettled([series])
+    assert stretches_unsettled([passes.series[0]]) == ""
     step = series.time[gap + 1] - series.time[gap]
     q, noise = math.exp(point.log_intensity), math.exp(2.0 * point.log_noise)
     drift = np.array([[1.0, step], [0.0, 1.0]])

@@ -77,6 +77,29 @@ def test_a_profile_is_not_computed_twice_at_one_point(
     assert found.log_drag_std == pytest.approx(sd)
 
 
+def test_the_force_moves_by_the_slope_of_the_determinant_at_the_minimum(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The determinant has the slope 0.8 by ln q, and bends with C_d: no point between the profiles
+    tells its value. Newton's step is the variance of ln q times the slope."""
+    sd, variance, slope = 0.1, 0.02, 0.8
+
+    def profile(_: Any, mode: Mode, log_drag: float, coefficients: np.ndarray) -> reml.Profile:
+        bent = 50.0 * log_drag**2 + 2.0 * log_drag / sd + slope * mode.point.log_intensity
+        return reml.Profile(log_drag, 0.0, log_drag / sd**2, bent, coefficients, reml.Pull())
+
+    monkeypatch.setattr(reml, "profile_at", profile)
+    point = Point(np.zeros((2, 1, 1)), log_drag=0.0, log_intensity=-10.0, log_noise=-8.0)
+    covariance = np.diag([1.0, 1.0, sd**2, variance, 1.0])
+    mode = Mode(point, Weights(1.0, 1.0), covariance, 1, 1, True, 0.0)
+    outline = SimpleNamespace(disc_radius_m=None)
+    search: Any = SimpleNamespace(passes=SimpleNamespace(body=SimpleNamespace(outline=outline)))
+    found = reml.restricted_drag(search, mode)
+    assert found.has_minimum
+    assert found.point.log_drag < -0.5 * sd
+    assert found.point.log_intensity == pytest.approx(-10.0 - variance * slope)
+
+
 @pytest.mark.slow
 def test_a_motion_without_random_force_has_no_numbers(
     table: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -109,7 +109,7 @@ struct FilterState {
   std::int64_t next; // the sample that comes next
   // After a gap or a contact with the wall, and no sample has given a velocity since.
   bool restarted;
-  double undragged; // the velocity is of so long before the state, and no drag acted since [s]
+  double undragged; // the velocity is that of so long ago; the drag since is still to act [s]
 };
 
 // The part of one strip in d(acceleration)/d(coefficients).

@@ -40,11 +40,10 @@ class InformationPolicy(NamedTuple):
     all within 1.7 standard deviations; at 94 to 98 % three had it 5 to 24 times too large (54
     recordings of the held-out set at the wall for more than 10 %)."""
     wall_share_in_doubt: float = 0.2
-    """Share of the intervals at the wall from which C_d has to be known well. Chosen with the next
-    one."""
+    """Share of the intervals at the wall from which C_d has to be known well. Chosen by hand."""
     most_drag_std_at_wall: float = 0.05
-    """Relative standard deviation of C_d up to which it is known well: of those recordings C_d was
-    0 to 7 % off where it is below, and up to 24 % where it is above."""
+    """Relative standard deviation of C_d up to which it is known well: in those recordings C_d was
+    0 to 7 % off below it and up to 24 % above, as the standard deviations say."""
     most_lever: float = 1 / 30
     """Lever of the force, in sides of the block. C_d was within 5 % at up to 0.027 of a side and
     more than 85 % off from 0.06 on (development set)."""
@@ -74,7 +73,7 @@ def verdict_on(fit: xr.Dataset, criteria: Sequence[Criterion], *, study: Study) 
         ),
         *_told(fit, "law_unsettled"),
         *_told(fit, "flow_modes_unsettled"),
-        *_told(fit, "gaps_unsettled"),
+        *_told(fit, "stretches_unsettled"),
     ]
     return verdict_of(against, unable)
 

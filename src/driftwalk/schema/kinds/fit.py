@@ -266,8 +266,8 @@ attributes (the strength changes too fast to be given in frames):
     flow_strength_left_out text: why the flow is given without it
 attributes (modes of the flow in time were asked for, and not found):
     flow_modes_unsettled text: why
-attributes (the recording has gaps, with short stretches between them):
-    gaps_unsettled text: how short, and what to do
+attributes (the stretches between gaps, or between contacts, are short):
+    stretches_unsettled text: how short, and what to do
 attributes (the law is not settled):
     law_unsettled text: reasons why a number of the law was not opened, or why the intervals hold \
         those of another law, too

@@ -11,9 +11,11 @@ from scipy.stats import chi2
 from driftwalk.comparison import ks_distance
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.criteria import (
+    LEAST,
     motion_criterion,
     noise_criterion,
     strength_criterion,
+    tail_criterion,
 )
 from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, velocity_at
 from driftwalk.likelihood.check.place import (
@@ -195,22 +197,33 @@ def test_one_passage_does_not_reject_a_model_that_is_right_elsewhere() -> None:
     assert many.kurtosis_p_value[1] < 1e-4
     assert one.p_value > 0.1 > 1e-3 > chi2.sf((one.autocorrelation**2).sum() * 6000, 40)
     # By brute force: the scatter of the sums of 10 s about what their samples should hold.
-    white = in_a_row[:, 1] / in_a_row[:, 1].std()
-    for lag, found in ((1, one.std[1, 0]), (5, one.std[1, 4])):
-        products = [white[k] * white[k - lag] for k in range(lag, 6000)]
-        by_cluster = [
-            products[max(first - lag, 0) : first + 100 - lag] for first in range(0, 6000, 100)
-        ]
-        off = [sum(part) - len(part) * np.mean(products) for part in by_cluster]
-        assert found == pytest.approx(np.sqrt(np.sum(np.square(off))) / len(products), rel=1e-2)
+    white = in_a_row[:, 1] / np.sqrt((in_a_row[:, 1] ** 2).mean())
+    influence = [z**4 - 6.0 * z**2 + 3.0 for z in white]
+    off = [sum(influence[k : k + 100]) - 100 * np.mean(influence) for k in range(0, 6000, 100)]
+    assert one.kurtosis_std[1] == pytest.approx(np.sqrt(np.sum(np.square(off))) / 6000, rel=1e-2)
+    assert one.kurtosis_std[0] == pytest.approx(np.sqrt(24.0 / 6000))
 
 
 def test_errors_that_are_correlated_everywhere_are_found() -> None:
-    """With 0.1 at a lag of one sample in 6000; the errors of clusters are those of white noise."""
+    """With 0.1 at a lag of one sample in 6000: as surely as without clusters."""
     noise = np.random.default_rng(32).normal(size=(6001, 2))
     found = whiteness_tests([errors_of_noise(noise[1:] + 0.1 * noise[:-1])], nothing_fitted())
+    plain = (((found.autocorrelation - found.expected) / found.std) ** 2).sum()
     assert found.p_value < 1e-6
-    assert found.std[:, 0] == pytest.approx(1.0 / np.sqrt(5999))
+    assert found.portmanteau == pytest.approx(plain, rel=0.05)
+
+
+def test_one_passage_does_not_hide_the_tails_of_another_component() -> None:
+    generator = np.random.default_rng(33)
+    white = np.stack(
+        [generator.standard_t(8, 6000) / np.sqrt(8 / 6), generator.normal(size=6000)], 1
+    )
+    white[2430:2442, 1] += 6.0
+    found = whiteness_tests([errors_of_noise(white)], nothing_fitted())
+    assert found.excess_kurtosis[1] > found.excess_kurtosis[0] > LEAST.kurtosis
+    said = tail_criterion(found, ("x", "y"))
+    assert said.failed
+    assert "kurtosis of x" in said.sentence
 
 
 def test_lags_without_a_pair_take_no_degree_of_freedom() -> None:
