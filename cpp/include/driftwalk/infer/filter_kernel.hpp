@@ -337,8 +337,9 @@ private:
         innovation_of(state_, found.value, found.variance, problem_.time_variance);
     const bool fits = e.chi_squared() < outlier_chi_squared;
     write_innovation(row, e);
-    // The first innovation after a gap or a contact tells of the velocity at its end alone, of which
-    // no law is assumed: counted, it would ask for the drag that makes any velocity the water's.
+    // The first innovation after a gap or a contact tells of the velocity at its end alone, of
+    // which no law is assumed: counted, it would ask for the drag that makes any velocity the
+    // water's.
     write_likelihood(row, fits && !excluded && !state_.restarted ? &e : nullptr);
     if (!fits && !excluded) {
       if (++state_.outliers <= most_outliers) {

@@ -16,7 +16,7 @@ def test_the_wall_of_a_simulation_is_found() -> None:
     """Intervals of 99.9 %: each misses once in a thousand; the seeds are fixed."""
     restitution, friction = 0.8, 0.3
     wall = {"tank.wall_restitution": restitution, "tank.wall_friction": friction}
-    track = driven(3, 400.0, wall)
+    track = driven(3, 500.0, wall)
     study = apply_overrides(coarse_study(), {"fit.confidence": 0.999})
     found = estimate_wall(dw.fit_motion(track, study), [track])
     assert int(found["wall_contacts"]) > 50
