@@ -22,7 +22,7 @@ from driftwalk.viewer.play.saved import local_tank
 
 PRELUDE = """async (given) => {
   const { modelOf, checkLocal, LocalTank } = driftwalkPlayground;
-  const { MotionWindow, outcomeOf, className } = driftwalkPlayground;
+  const { MotionWindow, outcomeOf, className, graphClass } = driftwalkPlayground;
   const model = given.local === undefined ? null : await modelOf(checkLocal(given.local, ""));
   const hex = (numbers) => Array.from(
     new BigUint64Array(Float64Array.from(numbers).buffer), (bits) => bits.toString(16));
@@ -91,15 +91,7 @@ def require_same_bits(tank: dw.LiveTank, moves: Sequence[Move], found: Any) -> N
         np.testing.assert_array_equal(numbers_of(there["pose"]), pose.ravel())
         np.testing.assert_array_equal(numbers_of(there["velocity"]), velocity.ravel())
         assert there["assembly"] == tank.assembly.tolist()
-        assert (there["outcome"], there["waiting"]) == (outcome_in_browser(tank), tank.waiting)
-
-
-def outcome_in_browser(tank: dw.LiveTank) -> str:
-    """Return the outcome class; of discs and rectangles the sizes of their assemblies."""
-    if tank.has_lattice:
-        return tank.outcome
-    sizes = np.unique(tank.assembly, return_counts=True)[1].tolist()
-    return "+".join(map(str, sorted(sizes, reverse=True)))
+        assert (there["outcome"], there["waiting"]) == (tank.outcome, tank.waiting)
 
 
 def knob_values(source: PlaySource) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 from twin.assembly import Rules, World, make_rules, start_world
-from twin.body import Assembly, Square
+from twin.body import Assembly, Shape
 from twin.latch import Latch
 
 import driftwalk as dw
@@ -17,7 +17,7 @@ import driftwalk as dw
 Floats = npt.NDArray[np.float64]
 
 SIDE, MASS = 0.03, 0.0116
-SQUARE = Square(SIDE, MASS)
+SQUARE, RECTANGLE = Shape(SIDE, MASS), Shape(0.04, MASS, 0.02)
 SETTINGS: dict[str, Any] = {
     "drag_coefficient": 0.0,
     "hidden_face_drag": "none",
@@ -26,8 +26,10 @@ SETTINGS: dict[str, Any] = {
 }
 
 
-def study(diameter: float = 0.3, **sections: Any) -> dw.Study:
-    return dw.Study(tank={"diameter_m": diameter, **sections.pop("tank", {})}, **sections)
+def study(size: float | dict[str, Any] = 0.3, **sections: Any) -> dw.Study:
+    """Return a study of a round tank by its diameter [m], or of a tank by its keys."""
+    given = size if isinstance(size, dict) else {"diameter_m": size}
+    return dw.Study(tank={**given, **sections.pop("tank", {})}, **sections)
 
 
 def swirl(study: dw.Study, *, angular_velocity: float = 0.6) -> xr.Dataset:
@@ -80,6 +82,17 @@ def rigid(
     )
 
 
+def laid(
+    first: int, places: Sequence[Sequence[float]], pose: Sequence[float], motion: Sequence[float]
+) -> Assembly:
+    """Return an assembly of rectangles at places (x, y, angle) from their mean, as they lie."""
+    none = np.zeros((len(places), 2), dtype=np.int64)
+    blocks = list(range(first, first + len(places)))
+    return Assembly(
+        RECTANGLE, blocks, none, none[:, 0], np.array(pose), np.array(motion), laid=np.array(places)
+    )
+
+
 def momentum(bodies: Sequence[Assembly]) -> Floats:
     """Return linear momentum and angular momentum about the origin, from every block alone."""
     total = np.zeros(3)
@@ -88,8 +101,14 @@ def momentum(bodies: Sequence[Assembly]) -> Floats:
         for x, y in body.centres():
             dx, dy = x - body.pose[0], y - body.pose[1]
             px, py = MASS * (vx - spin * dy), MASS * (vy + spin * dx)
-            total += [px, py, x * py - y * px + MASS * SIDE**2 / 6 * spin]
+            total += [px, py, x * py - y * px + MASS * square_radius(body) * spin]
     return total
+
+
+def square_radius(body: Assembly) -> float:
+    """Return the moment of inertia of one block over its mass [m²]."""
+    side, width = body.shape.side, body.shape.width
+    return (side**2 + (side if width is None else width) ** 2) / 12
 
 
 def energy(bodies: Sequence[Assembly]) -> float:
@@ -99,5 +118,5 @@ def energy(bodies: Sequence[Assembly]) -> float:
         vx, vy, spin = body.motion
         for x, y in body.centres() - body.pose[:2]:
             total += MASS / 2 * ((vx - spin * y) ** 2 + (vy + spin * x) ** 2)
-            total += MASS * SIDE**2 / 12 * spin**2
+            total += MASS / 2 * square_radius(body) * spin**2
     return total

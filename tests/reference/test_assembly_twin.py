@@ -7,6 +7,7 @@ are compared over one or two seconds, in which 1e-16 m does not grow to the tole
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -79,6 +80,10 @@ def placed(model: dw.Study, flow: xr.Dataset, blocks: int, key: int) -> Floats:
     return np.asarray(start[0])
 
 
+def rectangles(tank: float | dict[str, Any], size: str = "4x2cm", **sections: Any) -> dw.Study:
+    return study(tank, block={"shape": f"rectangle:{size}", "mass_kg": 0.012}, **sections)
+
+
 def world_key(seed: int) -> int:
     return int(world_keys(seed, trial=0, replicate=np.arange(1))[0])
 
@@ -132,8 +137,9 @@ def test_blocks_that_feel_each_other_agree(latching: str, interaction: dict[str,
 
 
 @pytest.mark.slow
-def test_free_blocks_agree_before_they_meet() -> None:
-    model = study(0.4)
+@pytest.mark.parametrize("make", [study, rectangles])
+def test_free_blocks_agree_before_they_meet(make: Callable[..., dw.Study]) -> None:
+    model = make(0.4)
     flow = swirl(model, angular_velocity=4.0)
     start = np.array([[0.06, 0, 0.3], [-0.05, 0.05, 9.0], [0, -0.08, -2], [0.02, 0.09, 1.6]])
     run = compare(
@@ -144,8 +150,9 @@ def test_free_blocks_agree_before_they_meet() -> None:
 
 
 @pytest.mark.slow
-def test_one_block_runs_to_its_last_step() -> None:
-    model = study(0.12)
+@pytest.mark.parametrize("make", [study, rectangles])
+def test_one_block_runs_to_its_last_step(make: Callable[..., dw.Study]) -> None:
+    model = make(0.12)
     flow = swirl(model, angular_velocity=3.0)
     start = np.array([[0.03, 0.01, 0.5]])
     run = compare(model, flow, start=start, key=world_key(2), force_std=2e-3, steps=150)
@@ -173,12 +180,69 @@ def test_events_and_poses_agree(
     assert (run["event_count"] > 0) == (latching != "none"), "nothing latched"
 
 
+MEETINGS: dict[str, list[list[float]]] = {
+    "ends": [[-0.0206, 0.002, 0.0], [0.0206, -0.001, 0.0]],
+    "sides": [[0.005, -0.0106, 0.0], [-0.004, 0.0106, np.pi]],
+    "end on a side": [[0.003, -0.0106, 0.0], [-0.002, 0.0206, np.pi / 2]],
+    "corner on a side": [[0.0, -0.0106, 0.0], [0.006, 0.0224, 0.8]],
+    "corner on an end": [[-0.0206, 0.002, 0.0], [0.0224, 0.0, 0.8]],
+    "corner on a corner": [[-0.021, -0.011, 0.0], [0.0206, 0.0106, 0.1]],
+}
+
+
+@pytest.mark.fast_cases(4)
+@pytest.mark.parametrize("latching", ["none", "collision"])
+@pytest.mark.parametrize("meeting", MEETINGS)
+def test_two_rectangles_agree_however_they_meet(meeting: str, latching: str) -> None:
+    model = rectangles(0.3)
+    run = compare(
+        model, drain(model, inflow=2.0, spin=1.5), start=np.array(MEETINGS[meeting]),
+        key=world_key(1), force_std=0.0, steps=60, latching=latching,
+    )  # fmt: skip
+    assert run["first_contact_step"] > 0, "the blocks never met"
+    assert run["event_count"] == (latching == "collision")
+
+
+# The last one is longer than its tank is from the centre to the wall.
 @pytest.mark.fast_cases(2)
-@pytest.mark.parametrize("hidden", ["none", "full"])
+@pytest.mark.parametrize(
+    ("size", "tank", "blocks", "seed"),
+    [
+        ("4x2cm", {"diameter_m": 0.16}, 4, 3),
+        ("2x4cm", {"shape": "rectangle", "width_m": 0.15, "height_m": 0.12}, 5, 2),
+        (
+            "6x1cm",
+            {"shape": "polygon", "vertices_m": [[-0.1, -0.08], [0.12, -0.07], [0, 0.13]]},
+            4,
+            6,
+        ),
+        ("10x3cm", {"diameter_m": 0.13}, 2, 5),
+    ],
+)
+@pytest.mark.parametrize("latching", ["none", "collision"])
+def test_rectangles_agree(
+    latching: str, size: str, tank: dict[str, Any], blocks: int, seed: int
+) -> None:
+    model = rectangles({"wall_friction": 0.1, **tank}, size)
+    flow, key = drain(model, inflow=2.0, spin=1.5), world_key(seed)
+    run = compare(
+        model, flow, start=placed(model, flow, blocks, key), key=key, force_std=2e-3, steps=70,
+        latching=latching,
+    )  # fmt: skip
+    assert run["first_contact_step"] > 0, "the blocks never met"
+    assert (run["event_count"] > 0) == (latching != "none"), "nothing latched"
+
+
+@pytest.mark.fast_cases(2)
+@pytest.mark.parametrize(
+    ("make", "hidden"), [(study, "none"), (study, "full"), (rectangles, "full")]
+)
 @pytest.mark.parametrize("law", BEYOND_PAPER)
-def test_events_and_poses_agree_beyond_the_paper_s_law(law: str, hidden: str) -> None:
+def test_events_and_poses_agree_beyond_the_paper_s_law(
+    law: str, make: Callable[..., dw.Study], hidden: str
+) -> None:
     forces = {"force_interval_s": 0.03, **BEYOND_PAPER[law]}
-    model = study(0.15, tank={"wall_friction": 0.1}, forces=forces)
+    model = make({"diameter_m": 0.15, "wall_friction": 0.1}, forces=forces)
     flow = drain(model, inflow=2.0, spin=1.5)
     key = world_key(104)
     run = compare(
@@ -239,14 +303,15 @@ TANKS: tuple[dict[str, Any], ...] = (
 )
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.fast_cases(2)
+@pytest.mark.parametrize("make", [study, rectangles])
 @pytest.mark.parametrize("seed", [0, 2, 3, 4, 7, 13, 17])
-def test_heaps_agree(seed: int) -> None:
+def test_heaps_agree(make: Callable[..., dw.Study], seed: int) -> None:
     """Blocks on top of each other, some through the wall: every rule of settling in a few steps."""
     rng = np.random.default_rng(seed)
-    model = dw.Study(tank=TANKS[seed % 3])
+    model = make(TANKS[seed % 3])
     start = np.column_stack([rng.uniform(-0.05, 0.05, (5, 2)), rng.uniform(-4, 4, 5)])
-    for latching in ("none", "collision", "connector"):
+    for latching in ("none", "collision", *(["connector"] if make is study else [])):
         run = compare(
             model, swirl(model), start=start, key=world_key(seed), force_std=2e-3, steps=5,
             latching=latching, tolerance=WEDGED_TOLERANCE,
@@ -278,11 +343,13 @@ def test_samples_agree() -> None:
     assert np.abs(difference).max() < 1e-6  # float32
 
 
-def random_case(seed: int) -> tuple[dw.Study, xr.Dataset, dict[str, Any]]:
+def random_case(
+    seed: int, make: Callable[..., dw.Study] = study
+) -> tuple[dw.Study, xr.Dataset, dict[str, Any]]:
     """Any tank, any rules, two to six blocks, often crowded and shaken hard."""
     rng = np.random.default_rng(seed)
     walls = {"wall_friction": rng.choice([0.0, 0.3]), "wall_restitution": rng.uniform()}
-    model = dw.Study(tank={**TANKS[rng.integers(3)], **walls})
+    model = make({**TANKS[rng.integers(3)], **walls})
     flow = drain(model, inflow=rng.uniform(-0.5, 2), spin=rng.uniform(-2, 2))
     blocks, key = int(rng.integers(2, 7)), world_key(seed)
     return model, flow, {
@@ -300,10 +367,13 @@ def random_case(seed: int) -> tuple[dw.Study, xr.Dataset, dict[str, Any]]:
 
 
 @pytest.mark.slow
-def test_random_worlds_agree_for_a_second_and_a_half() -> None:
+@pytest.mark.parametrize("make", [study, rectangles])
+def test_random_worlds_agree_for_a_second_and_a_half(make: Callable[..., dw.Study]) -> None:
     met = latched = 0
     for seed in range(15):
-        model, flow, arguments = random_case(seed)
+        model, flow, arguments = random_case(seed, make)
+        if make is rectangles and arguments["latching"] == "connector":
+            arguments["latching"] = "collision"
         run = compare(model, flow, steps=150, **arguments)
         met += run["first_contact_step"] > 0
         latched += int(run["event_count"])

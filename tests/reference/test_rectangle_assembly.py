@@ -345,6 +345,24 @@ def test_rectangles_stay_inside_and_apart_and_have_the_same_bits_alone() -> None
         assert depth[apart].max(initial=0.0) < 1.2e-4
 
 
+@pytest.mark.parametrize("shape", ["rectangle:10x3cm", "xxx:3.3cm"])
+def test_a_body_almost_as_long_as_its_tank_has_the_same_bits_alone(shape: str) -> None:
+    """The two corners at the wall are more than a right angle apart, as seen from the middle."""
+    case = dw.Study(
+        block={"shape": shape, "mass_kg": 0.024}, tank={"diameter_m": 0.13},
+        forces={"force_std_N": 1e-3, "drag_coefficient": 0.45},
+    )  # fmt: skip
+    flow = dw.uniform_flow(0.02, 0.0, arena={"shape": "circle", "diameter_m": 1.0})
+    how = {"sample_time": np.arange(0.0, 20.0, 0.5), "start": Start(0.0, 0.0, 0.3)}
+    found = [[simulate(case, flow, replicates=n, **how) for n in (32, 4)]]
+    if case.block.shape == "rectangle":
+        rest = {"blocks": 1, "duration": 20.0, "sample_interval": 0.5}
+        found.append([assembly_path(case, flow, runs=range(n), **rest) for n in (32, 4)])
+    for many, few in found:
+        for name in ("x", "y", "theta"):
+            assert np.array_equal(many[name].values[:4], few[name].values)
+
+
 @pytest.mark.parametrize(
     ("keys", "words"),
     [

@@ -195,3 +195,24 @@ def test_the_water_carries_a_floating_body_round(shape: str) -> None:
     circle = 0.05 * np.exp(1j * 0.1 * np.arange(61))
     assert np.abs(place[0] - circle).max() < 2e-3 * 0.05
     assert angle[0, -1] == pytest.approx(6.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("shape", ["square:3cm", *OUTLINES])
+def test_the_water_turns_a_floating_body_as_itself(shape: str) -> None:
+    """In u = g z with complex g, Du/Dt = g² z: from rest it moves as cosh(g t) and spins im(g²) t.
+
+    That holds for every outline.
+    """
+    axis = np.linspace(-0.2, 0.2, 41)
+    x, y = np.meshgrid(axis, axis)
+    water = (growth := -0.5 + 1j) * (x + 1j * y)
+    flow = build_flow_field(
+        axis, axis, u=water.real, v=water.imag, flag=np.ones(x.shape, dtype=np.int8)
+    )
+    place, angle = poses(
+        shape, dw.simulation.Start(0.02, 0.0, 0.3), 1.0, tank=CIRCLE, flow=flow, every=0.1,
+        forces={"pressure_gradient": True, "added_mass_share": 0.5},
+    )  # fmt: skip
+    time = 0.1 * np.arange(11)
+    np.testing.assert_allclose(place[0], 0.02 * np.cosh(growth * time), atol=1e-4)
+    np.testing.assert_allclose(angle[0], 0.3 + (growth**2).imag * time**2 / 2, atol=2e-3)

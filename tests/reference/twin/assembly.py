@@ -49,7 +49,7 @@ from driftwalk.assembly.pull.tables import BlockPull, block_pull
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import wall_edges
 from twin.block import TwinModel, drag, force_normals, next_force, push_of_water
-from twin.body import Assembly, Floats, Square, cross, single_block, wrapped
+from twin.body import Assembly, Floats, Shape, cross, single_block, wrapped
 from twin.bonds import CLOSING, JOINING, Bonds, break_bonds, faces_between
 from twin.contacts import collide, overlapping_pairs, separate
 from twin.faces import Faces
@@ -80,9 +80,9 @@ class Rules:
     pull: BlockPull | None = None
 
     @property
-    def square(self) -> Square:
+    def shape(self) -> Shape:
         """The block, with the mass that it carries along."""
-        return Square(self.model.side, float(self.model.moved[0]))
+        return Shape(self.model.side, float(self.model.moved[0]), self.model.width)
 
 
 class Event(NamedTuple):
@@ -263,6 +263,7 @@ def make_rules(
     )
     model = TwinModel(
         side=study.block.side_m,
+        width=study.block.width_m,
         mass=study.block.mass_kg,
         depth=study.wetted_depth_m,
         strips=study.block.strips_per_face,
@@ -299,7 +300,7 @@ def make_rules(
 
 def start_world(rules: Rules, start: Floats) -> World:
     """Return blocks at rest at poses (blocks, 3) [m, m, rad]."""
-    return World(rules, [single_block(rules.square, k, pose) for k, pose in enumerate(start)])
+    return World(rules, [single_block(rules.shape, k, pose) for k, pose in enumerate(start)])
 
 
 def block_normals(key: int, interval: int, blocks: int) -> Floats:
@@ -356,14 +357,14 @@ def drag_sums(
     rules, model = world.rules, world.rules.model
     arms = [body.arms(pose[2]) for body, pose in zip(world.assemblies, poses, strict=True)]
     columns = []
-    for pose, motion, arm in zip(poses, motions, arms, strict=True):
+    for body, pose, motion, arm in zip(world.assemblies, poses, motions, arms, strict=True):
         low_x, high_x, low_y, high_y = rules.bounds
         x, y = (
             np.clip(pose[0] + arm[:, 0], low_x, high_x),
             np.clip(pose[1] + arm[:, 1], low_y, high_y),
         )
         vx, vy = motion[0] - motion[2] * arm[:, 1], motion[1] + motion[2] * arm[:, 0]
-        columns.append([x, y, np.full_like(x, pose[2]), vx, vy, np.full_like(x, motion[2])])
+        columns.append([x, y, pose[2] + body.turns, vx, vy, np.full_like(x, motion[2])])
     members = np.concatenate(columns, axis=1)
     hidden = np.concatenate([body.hidden for body in world.assemblies]).T
     coefficient = np.full(members.shape[1], rules.drag_coefficient)
@@ -391,7 +392,7 @@ def drag_sums(
         first += body.size
         force = np.stack([force_x[own], force_y[own]], axis=1)
         turning = (torque[own] + cross(arm, force)).sum()
-        spread = 4 / 3 * body.square.half**2 + (arm**2).sum(axis=1)
+        spread = model.turning + (arm**2).sum(axis=1)
         damping = np.array([conductance[own].sum()] * 2 + [(conductance[own] * spread).sum()])
         acceleration = np.array([*force.sum(axis=0), turning]) * body.inverse_mass
         sums.append((acceleration, damping * body.inverse_mass))

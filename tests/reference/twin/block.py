@@ -47,11 +47,29 @@ class TwinModel:
     drag_power: float = 2.0
     drag_speed: float = 0.03
     force_memory: float = 0.0
+    width: float | None = None  # second side of a rectangle
+
+    @property
+    def half(self) -> Floats:
+        """Half of both sides [m], along the block's own x and y."""
+        return np.array([self.side, self.width or self.side]) / 2
 
     @property
     def inertia(self) -> float:
         """Moment of inertia about the vertical [kg m^2]."""
-        return self.mass * self.side**2 / 6.0
+        return self.mass * float((self.half**2).sum()) / 3
+
+    @property
+    def turning(self) -> float:
+        """Mean squared distance of the sides from the centre [m^2]; of a rectangle, its strips'."""
+        if self.width is None:
+            return self.side**2 / 3
+        squares = [((self.half[face] ** 2 + self.places(face) ** 2).mean()) for face in (0, 1)]
+        return float(np.average(squares, weights=self.half[::-1]))
+
+    def places(self, face: int) -> Floats:
+        """Return the middles of the strips along a face [m], shape (strips,)."""
+        return self.half[1 - face % 2] * ((2 * np.arange(self.strips) + 1) / self.strips - 1)
 
     @property
     def moved(self) -> Floats:
@@ -132,12 +150,12 @@ def water_acceleration(model: TwinModel, pose: Floats) -> Floats:
     x, y, theta = pose
     total = np.zeros((3, x.size))
     places, weights = np.polynomial.legendre.leggauss(3)
-    for across, first in zip(model.side / 2 * places, weights / 2, strict=True):
-        for along, second in zip(model.side / 2 * places, weights / 2, strict=True):
+    for across, first in zip(model.half[0] * places, weights / 2, strict=True):
+        for along, second in zip(model.half[1] * places, weights / 2, strict=True):
             arm_x = across * np.cos(theta) - along * np.sin(theta)
             arm_y = across * np.sin(theta) + along * np.cos(theta)
             u, v = _bilinear(model, (nodes[0], nodes[1]), x + arm_x, y + arm_y)
-            spin = 6 / model.side**2 * (arm_x * v - arm_y * u)
+            spin = model.mass / model.inertia * (arm_x * v - arm_y * u)
             total += first * second * np.stack([u, v, spin])
     return total
 
@@ -146,7 +164,7 @@ def push_of_water(model: TwinModel, pose: Floats) -> Floats:
     """Return the force [N] and torque [N m] of the water's own acceleration, shape (3, worlds)."""
     if model.displaced_mass == 0:
         return np.zeros((3, pose.shape[1]))
-    own = np.array([1, 1, model.side**2 / 6]) * model.displaced_mass
+    own = np.array([1, 1, model.inertia / model.mass]) * model.displaced_mass
     added = model.added_mass_share * np.array([model.mass, model.mass, model.inertia])
     return np.asarray((own + added)[:, None] * water_acceleration(model, pose))
 
@@ -183,13 +201,13 @@ def drag(
 
     A face that is `hidden`, shape (4, worlds), adds nothing to any of them.
     """
-    half, width = model.side / 2, model.side / model.strips
-    offset = ((np.arange(model.strips) + 0.5) * width - half)[:, None]
-    scale = 0.5 * model.water_density * drag_coefficient * width * model.depth
     x, y, theta = pose
     vx, vy, omega = motion
     force_x, force_y, torque, conductance = (np.zeros_like(x) for _ in range(4))
     for face in range(4):
+        half, offset = model.half[face % 2], model.places(face)[:, None]
+        width = 2 * model.half[1 - face % 2] / model.strips
+        scale = 0.5 * model.water_density * drag_coefficient * width * model.depth
         angle = theta + face * np.pi / 2
         normal_x, normal_y = np.cos(angle), np.sin(angle)
         arm_x = half * normal_x - offset * normal_y
@@ -200,7 +218,7 @@ def drag(
         facing = np.maximum(0.0, -(normal_x * relative_x + normal_y * relative_y))
         speed = np.maximum(np.hypot(relative_x, relative_y) / model.drag_speed, 1e-9)
         own = scale * facing * speed ** (model.drag_power - 2.0)
-        own += model.linear_drag / (4 * model.strips)
+        own += model.linear_drag * width / (4 * model.half.sum())
         if hidden is not None:
             own = np.where(hidden[face], 0.0, own)
         strip_x, strip_y = own * relative_x, own * relative_y
@@ -226,7 +244,7 @@ def simulate_reference(
     before = np.zeros_like(motion)
     per_mass = 1 / model.moved[:, None]
     dt = model.time_step
-    spread = np.array([1.0, 1.0, model.side**2 / 3])[:, None]
+    spread = np.array([1.0, 1.0, model.turning])[:, None]
     pose, motion, _ = meet_circle(model, pose, motion)
     path = [pose]
     noise = np.zeros_like(motion)

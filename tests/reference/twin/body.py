@@ -1,4 +1,4 @@
-"""Rigid assemblies of square blocks, for the NumPy twin of the self-assembly kernel."""
+"""Rigid assemblies of squares or rectangles, for the NumPy twin of the self-assembly kernel."""
 
 from __future__ import annotations
 
@@ -36,35 +36,45 @@ def wrapped(angle: float) -> float:
 
 
 @dataclass(frozen=True)
-class Square:
-    """Constants of all blocks: side a [m] and mass m [kg]."""
+class Shape:
+    """Constants of all blocks: side a [m], mass m [kg] and a rectangle's second side [m].
+
+    Squares latch on a lattice, rectangles as they lie.
+    """
 
     side: float
     mass: float
+    width: float | None = None
 
     @property
-    def half(self) -> float:
-        """Half a side h [m]."""
-        return self.side / 2
+    def on_lattice(self) -> bool:
+        """Whether blocks are squares."""
+        return self.width is None
+
+    @property
+    def half(self) -> Floats:
+        """Half of both sides [m], along the block's own x and y."""
+        return np.array([self.side, self.width or self.side]) / 2
 
     @property
     def inertia(self) -> float:
         """Moment of inertia about the vertical [kg m^2]."""
-        return self.mass * self.side**2 / 6
+        return self.mass * float((self.half**2).sum()) / 3
 
 
 @dataclass(eq=False)
 class Assembly:
-    """Blocks on a square lattice that move as one.
+    """Blocks that move as one, on a square lattice or as they lie.
 
     Member k is block ``blocks[k]``; it sits in cell ``cells[k]`` and its own frame is the
-    assembly's, turned by ``quarters[k]`` quarter turns. Pose and motion are the centre of mass's;
-    `drag` is the last step's drag acceleration, `before` the pose at the start of the step. All
-    four are (x, y, angle) in SI units and change; members and cells stay: a merge makes a new
+    assembly's, turned by ``quarters[k]`` quarter turns. Off the lattice, where both are zero,
+    ``laid[k]`` is its pose in the frame of the centre of mass. Pose and motion are the centre of
+    mass's; `drag` is the last step's drag acceleration, `before` the pose at the start of the step.
+    All four are (x, y, angle) in SI units and change; members and places stay: a merge makes a new
     assembly.
     """
 
-    square: Square
+    shape: Shape
     blocks: list[int]
     cells: Ints
     quarters: Ints
@@ -72,6 +82,7 @@ class Assembly:
     motion: Floats = field(default_factory=lambda: np.zeros(3))
     drag: Floats = field(default_factory=lambda: np.zeros(3))
     before: Floats = field(init=False)
+    laid: Floats | None = None
 
     def __post_init__(self) -> None:
         self.before = self.pose.copy()
@@ -84,18 +95,25 @@ class Assembly:
     @property
     def mass(self) -> float:
         """Mass M [kg]."""
-        return self.square.mass * self.size
+        return self.shape.mass * self.size
 
     @cached_property
     def offsets(self) -> Floats:
         """Members from the centre of mass in the assembly's frame [m], shape (n, 2)."""
-        return np.asarray(self.square.side * (self.cells - self.cells.mean(axis=0)))
+        if self.laid is not None:
+            return self.laid[:, :2]
+        return np.asarray(self.shape.side * (self.cells - self.cells.mean(axis=0)))
+
+    @cached_property
+    def turns(self) -> Floats:
+        """Angles of the members' sides in the assembly's frame [rad]: 0 on the lattice."""
+        return np.zeros(self.size) if self.laid is None else self.laid[:, 2]
 
     @cached_property
     def inertia(self) -> float:
         """Moment of inertia about the centre of mass [kg m^2]."""
-        about_own = self.square.inertia * self.size
-        return about_own + self.square.mass * float((self.offsets**2).sum())
+        about_own = self.shape.inertia * self.size
+        return about_own + self.shape.mass * float((self.offsets**2).sum())
 
     @cached_property
     def inverse_mass(self) -> Floats:
@@ -130,21 +148,23 @@ class Assembly:
         """Return the position of a member [m]."""
         return np.asarray(self.centres()[self.blocks.index(block)])
 
-    def face_normal(self, face: int) -> Floats:
-        """Return the outward normal of face 0 .. 3, in the assembly's frame, of any member."""
-        return turned(np.array([1.0, 0.0]), self.pose[2] + face * np.pi / 2)
+    def face_normal(self, block: int, face: int) -> Floats:
+        """Return the outward normal of a member's face 0 .. 3, on the lattice as the assembly's."""
+        turn = self.turns[self.blocks.index(block)]
+        return turned(np.array([1.0, 0.0]), self.pose[2] + turn + face * np.pi / 2)
 
     def block_poses(self) -> Floats:
         """Return the poses of the members [m, m, rad], shape (n, 3)."""
-        angles = [wrapped(self.pose[2] + quarter * np.pi / 2) for quarter in self.quarters]
+        turns = self.turns + self.quarters * np.pi / 2
+        angles = [wrapped(self.pose[2] + turn) for turn in turns]
         return np.column_stack([self.centres(), angles])
 
 
-def single_block(square: Square, block: int, pose: Floats) -> Assembly:
+def single_block(shape: Shape, block: int, pose: Floats) -> Assembly:
     """Return a block at rest, an assembly of its own."""
     x, y, theta = pose
     return Assembly(
-        square,
+        shape,
         [block],
         np.zeros((1, 2), dtype=np.int64),
         np.zeros(1, dtype=np.int64),

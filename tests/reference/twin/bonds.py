@@ -1,5 +1,6 @@
 """Bonds that break, for the NumPy twin of the self-assembly kernel: at a constant rate.
 
+* Bonded are members in neighbouring cells; off the lattice, those whose gap is at most CONTACT_GAP.
 * A bond's hazard, from the exponential law of mean 1, is drawn in the step in which it forms.
 * Bonds wear after the wall has acted and before blocks latch; those that come to their end in one
   step do so in the order of their blocks.
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,11 +21,13 @@ import numpy as np
 from driftwalk.core.random_streams import Purpose
 from twin.block import philox
 from twin.body import NEIGHBOURS, Assembly, Floats, turned
+from twin.contacts import Pair as BlockPair, overlap
 
 if TYPE_CHECKING:
     from twin.assembly import World
 
 JOINING, PARTING, OPENING, CLOSING = range(4)
+CONTACT_GAP = 0.01  # longer sides
 
 Pair = tuple[int, int]
 
@@ -81,7 +85,13 @@ class Bonds:
 
 
 def neighbours(body: Assembly) -> Iterator[Pair]:
-    """Yield the pairs of members in neighbouring cells, the lower block first."""
+    """Yield the pairs of members in neighbouring cells, or in contact, the lower block first."""
+    if not body.shape.on_lattice:
+        for pair in combinations(body.blocks, 2):
+            gap = -overlap(BlockPair((body, body), pair)).depth
+            if gap <= CONTACT_GAP * 2 * body.shape.half.max():
+                yield pair
+        return
     at = {(int(x), int(y)): block for block, (x, y) in zip(body.blocks, body.cells, strict=True)}
     for (x, y), block in at.items():
         for dx, dy in NEIGHBOURS[:2]:
@@ -93,7 +103,7 @@ def neighbours(body: Assembly) -> Iterator[Pair]:
 def break_bonds(world: World, bonds: Bonds) -> list[tuple[int, Pair, Pair]]:
     """Break what is due in a world, and return kind, blocks and own faces of each event."""
     centres = world.gather("pose")[:, :2]
-    square = world.rules.square
+    square = world.rules.shape
     events = []
     for pair in bonds.wear(world.rules.model.time_step, centres, square.side):
         del bonds.left[pair]
@@ -123,11 +133,12 @@ def part_of(body: Assembly, blocks: list[int]) -> Assembly:
     shift = body.offsets[rows].mean(axis=0)
     arm = turned(shift, body.pose[2])
     made = Assembly(
-        body.square,
+        body.shape,
         blocks,
         body.cells[rows] - body.cells[rows[0]],
         body.quarters[rows],
         np.array([*(body.pose[:2] + arm), body.pose[2]]),
+        laid=None if body.laid is None else body.laid[rows] - np.array([*shift, 0.0]),
     )
     vx, vy, spin = body.motion
     made.motion = np.array([vx - spin * arm[1], vy + spin * arm[0], spin])
@@ -135,7 +146,12 @@ def part_of(body: Assembly, blocks: list[int]) -> Assembly:
 
 
 def faces_between(body: Assembly, pair: Pair) -> Pair:
-    """Return the faces of two neighbours that look at each other, in the blocks' own frames."""
+    """Return the faces of two neighbours that look at each other, in the blocks' own frames.
+
+    Off the lattice they are 0.
+    """
+    if not body.shape.on_lattice:
+        return 0, 0
     rows = [body.blocks.index(block) for block in pair]
     step = body.cells[rows[1]] - body.cells[rows[0]]
     face = int(np.flatnonzero((step == NEIGHBOURS).all(axis=1))[0])

@@ -30,6 +30,15 @@ class Pair:
         """Return the position of one of the two blocks [m]."""
         return self.bodies[side].centre_of(self.blocks[side])
 
+    def normal(self, side: int, face: int) -> Floats:
+        """Return the outward normal of a face of one of them."""
+        return self.bodies[side].face_normal(self.blocks[side], face)
+
+    def reach(self, side: int, direction: Floats) -> float:
+        """Return how far one of them reaches from its centre in a direction [m]."""
+        axes = np.array([self.normal(side, face) for face in (0, 1)])
+        return float(self.bodies[side].shape.half @ np.abs(axes @ direction))
+
 
 class Overlap(NamedTuple):
     """How deep two blocks overlap [m], negative when apart, and along what.
@@ -59,7 +68,7 @@ def close_pairs(assemblies: list[Assembly], distance: float) -> list[Pair]:
 
 def overlapping_pairs(assemblies: list[Assembly]) -> list[Pair]:
     """Return the pairs of blocks that overlap, in order of numbers."""
-    diagonal = assemblies[0].square.side * np.sqrt(2)
+    diagonal = 2 * float(np.hypot(*assemblies[0].shape.half))
     return [pair for pair in close_pairs(assemblies, diagonal) if overlap(pair).depth > 0]
 
 
@@ -69,15 +78,13 @@ def overlap(pair: Pair) -> Overlap:
     Among equal axes it is the first of: the first block's x, y, the second block's x, y, as their
     assemblies have them.
     """
-    first, second = pair.bodies
-    apart = pair.centre(1) - pair.centre(0)
-    axes = [body.face_normal(face) for body in pair.bodies for face in (0, 1)]
-    reach = [float(apart @ axis) for axis in axes]
-    best = int(np.argmax(np.abs(reach)))
-    angle = second.pose[2] - first.pose[2]
-    thickness = first.square.half * (1 + abs(np.cos(angle)) + abs(np.sin(angle)))
-    normal = axes[best] if reach[best] >= 0 else -axes[best]
-    return Overlap(float(thickness - abs(reach[best])), normal, best // 2)
+    axes = np.array([pair.normal(side, face) for side in (0, 1) for face in (0, 1)])
+    apart = (axes * (pair.centre(1) - pair.centre(0))).sum(axis=1)
+    half = np.concatenate([body.shape.half for body in pair.bodies])
+    reach = (half * np.abs((axes[:, None] * axes).sum(axis=2))).sum(axis=1)
+    best = int(np.argmin(reach - np.abs(apart)))
+    normal = axes[best] if apart[best] >= 0 else -axes[best]
+    return Overlap(float(reach[best] - abs(apart[best])), normal, best // 2)
 
 
 def contact_points(pair: Pair) -> list[tuple[Floats, float]]:
@@ -89,16 +96,18 @@ def contact_points(pair: Pair) -> list[tuple[Floats, float]]:
     rounding errors can have none.
     """
     _, normal, owner = overlap(pair)
-    half = pair.bodies[0].square.half
     outward = normal if owner == 0 else -normal
     centre, other = pair.centre(owner), pair.centre(1 - owner)
-    normals = [pair.bodies[1 - owner].face_normal(face) for face in range(4)]
+    normals = [pair.normal(1 - owner, face) for face in range(4)]
     facing = min(normals, key=lambda direction: float(direction @ outward))
     along = np.array([-facing[1], facing[0]])
-    face = (other + half * (facing + along), other + half * (facing - along))
-    beside = np.array([-outward[1], outward[0]])
-    ends = _clip(*face, centre, beside, half)
-    measured = [(point, half - float((point - centre) @ outward)) for point in ends]
+    middle, side = other + pair.reach(1 - owner, facing) * facing, pair.reach(1 - owner, along)
+    across = np.array([-outward[1], outward[0]])
+    ends = _clip(
+        middle + side * along, middle - side * along, centre, across, pair.reach(owner, across)
+    )
+    height = pair.reach(owner, outward)
+    measured = [(point, height - float((point - centre) @ outward)) for point in ends]
     return [(point, depth) for point, depth in measured if depth > 0]
 
 

@@ -36,7 +36,8 @@ class Latch:
 class Candidate(NamedTuple):
     """Two free faces that may join; faces as their assemblies number them.
 
-    In the order of their distance [m], then of block, face, other block, other face.
+    In the order of their distance [m], then of block, face, other block, other face. Off the
+    lattice it is that of the centres, and faces are 0.
     """
 
     distance: float
@@ -75,10 +76,12 @@ def latch_once(
             continue
         # More blocks stay; of equal ones the one with the lowest block.
         stayed, moved = sorted(ends, key=lambda end: (-end[0].size, end[0].blocks[0]))
-        made = merged(stayed, moved)
+        on_lattice = stayed[0].shape.on_lattice
+        made = merged(stayed, moved) if on_lattice else laid_together(stayed, moved)
         if made is None or not push_inside(wall, made, corners=MERGE_CORNERS):
             continue
-        others = [body for body in assemblies if body not in (stayed[0], moved[0])]
+        # What then overlaps a third one off the lattice latches to it next.
+        others = [body for body in assemblies if on_lattice and body not in (stayed[0], moved[0])]
         if not any(_overlap_deeply(made, place) for other in others for place in _places(other)):
             if latch.faces is not None and latch.faces.refused(made, stayed[0].blocks):
                 continue
@@ -96,7 +99,7 @@ def latch_once(
 
 def _places(body: Assembly) -> tuple[Assembly, Assembly]:
     """Return an assembly where it is and where it was: a jam takes it back there."""
-    return body, Assembly(body.square, body.blocks, body.cells, body.quarters, body.before)
+    return body, Assembly(body.shape, body.blocks, body.cells, body.quarters, body.before)
 
 
 def _overlap_deeply(made: Assembly, other: Assembly) -> bool:
@@ -110,8 +113,12 @@ def candidates(latch: Latch, assemblies: list[Assembly]) -> Iterator[Candidate]:
     if latch.latching == "collision":
         pairs = overlapping_pairs(assemblies)
     else:
-        pairs = close_pairs(assemblies, assemblies[0].square.side + latch.distance + 1e-9)
+        pairs = close_pairs(assemblies, assemblies[0].shape.side + latch.distance + 1e-9)
     for pair in pairs:
+        if not pair.bodies[0].shape.on_lattice:
+            distance = float(np.hypot(*(pair.centre(1) - pair.centre(0))))
+            yield Candidate(distance, pair.blocks[0], 0, pair.blocks[1], 0)
+            continue
         for face, normal, centre in _free_faces(pair, 0):
             for other_face, other_normal, other_centre in _free_faces(pair, 1):
                 distance = float(np.hypot(*(other_centre - centre)))
@@ -136,8 +143,8 @@ def _free_faces(pair: Pair, side: int) -> Iterator[tuple[int, Floats, Floats]]:
     hidden = body.hidden[body.blocks.index(block)]
     for face in range(4):
         if not hidden[face]:
-            normal = body.face_normal(face)
-            yield face, normal, pair.centre(side) + body.square.half * normal
+            normal = pair.normal(side, face)
+            yield face, normal, pair.centre(side) + body.shape.side / 2 * normal
 
 
 def _facing(pair: Pair, normal: Floats, other_normal: Floats) -> bool:
@@ -162,13 +169,39 @@ def merged(stayed: tuple[Assembly, int, int], moved: tuple[Assembly, int, int]) 
     blocks = body.blocks + other.blocks
     order = np.argsort(blocks)
     joint_cells = np.concatenate([body.cells, cells])
-    shift = body.square.side * (joint_cells.mean(axis=0) - body.cells.mean(axis=0))
+    shift = body.shape.side * (joint_cells.mean(axis=0) - body.cells.mean(axis=0))
     made = Assembly(
-        body.square,
+        body.shape,
         [blocks[k] for k in order],
         joint_cells[order],
         np.concatenate([body.quarters, (other.quarters + quarters) % 4])[order],
         np.array([*(body.pose[:2] + turned(shift, body.pose[2])), body.pose[2]]),
+    )
+    made.motion = _joint_motion(body, other, made.inertia)
+    return made
+
+
+def laid_together(stayed: tuple[Assembly, int, int], moved: tuple[Assembly, int, int]) -> Assembly:
+    """Return the rigid body of two assemblies as they lie, apart by so much that both blocks touch.
+
+    Both are shifted along the axis of least depth, about their joint centre of mass. The frame is
+    the first one's.
+    """
+    (body, block, _), (other, other_block, _) = stayed, moved
+    depth, normal, _ = overlap(Pair((body, other), (block, other_block)))
+    way = depth / (body.size + other.size) * normal
+    centres = np.concatenate([body.centres() - other.size * way, other.centres() + body.size * way])
+    turns = np.concatenate([body.turns, other.turns + other.pose[2] - body.pose[2]])
+    middle = centres.mean(axis=0)
+    offsets = turned(centres - middle, -body.pose[2])
+    order = np.argsort(body.blocks + other.blocks)
+    made = Assembly(
+        body.shape,
+        sorted(body.blocks + other.blocks),
+        np.concatenate([body.cells, other.cells]),
+        np.concatenate([body.quarters, other.quarters]),
+        np.array([*middle, body.pose[2]]),
+        laid=np.column_stack([offsets, turns])[order],
     )
     made.motion = _joint_motion(body, other, made.inertia)
     return made

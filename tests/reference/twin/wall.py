@@ -138,11 +138,12 @@ def _directions(wall: Wall, body: Assembly, member: int) -> Floats:
 
 def _leading_corners(body: Assembly, member: int, direction: Floats) -> Floats:
     """Return the two corners that can touch, deepest first, from the assembly's centre of mass."""
-    half = body.square.half
-    ahead, aside = turned(direction[:2], -body.pose[2])
-    first = np.array([np.copysign(half, ahead), np.copysign(half, aside)])
-    flip = np.array([-1, 1]) if abs(ahead) < abs(aside) else np.array([1, -1])
-    corners = turned(np.stack([first, first * flip]), body.pose[2])
+    angle = body.pose[2] + body.turns[member]
+    toward = turned(direction[:2], -angle)
+    first = np.copysign(body.shape.half, toward)
+    ahead, aside = first * toward
+    flip = np.array([-1, 1]) if ahead < aside else np.array([1, -1])
+    corners = turned(np.stack([first, first * flip]), angle)
     return np.asarray(body.arms()[member] + corners)
 
 

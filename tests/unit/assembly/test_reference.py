@@ -17,16 +17,18 @@ from twin.assembly import (
     integrate,
 )
 from twin.block import TwinModel, flow_at, simulate_reference
-from twin.body import Assembly, single_block as one_block
+from twin.body import Assembly, Shape, single_block as one_block
 from twin.contacts import Pair, collide, contact_points, overlap, separate
-from twin.latch import Latch, candidates, latch_once, merged
+from twin.latch import Latch, candidates, laid_together, latch_once, merged
 from twin.wall import meet_wall
 from twin_assembly import (
     MASS,
+    RECTANGLE,
     SIDE,
     SQUARE,
     Floats,
     energy,
+    laid,
     momentum,
     rigid,
     rules,
@@ -42,6 +44,8 @@ from driftwalk.core.errors import InputError
 HALF = SIDE / 2
 DIMER, LINE, CORNER = [[0, 0], [1, 0]], [[0, 0], [1, 0], [2, 0]], [[0, 0], [1, 0], [0, 1]]
 SHAPES = ([[0, 0]], DIMER, LINE, CORNER)
+LAID = ([[0.0, 0.0, 0.0]], [[-0.015, 0.0, 0.0], [0.015, 0.0, 1.5]])
+BOTH_SHAPES = pytest.mark.parametrize("shape", [SQUARE, RECTANGLE], ids=["square", "rectangle"])
 PLAIN: dict[str, Any] = {
     "connector_distance": 2e-3,
     "connector_axis": 0.2,
@@ -50,13 +54,14 @@ PLAIN: dict[str, Any] = {
 }
 
 
-def corners(x: float, y: float, angle: float) -> Floats:
-    around = angle + np.pi / 4 + np.arange(4) * np.pi / 2
-    return np.array([x, y]) + SIDE / np.sqrt(2) * np.column_stack([np.cos(around), np.sin(around)])
-
-
 def corners_of(body: Assembly) -> Floats:
-    return np.concatenate([corners(x, y, body.pose[2]) for x, y in body.centres()])
+    length, width = body.shape.side, body.shape.width or body.shape.side
+    arms = np.array([length + 1j * width, -length + 1j * width]) / 2
+    z = np.concatenate([
+        complex(x, y) + np.exp(1j * (body.pose[2] + turn)) * np.array([*arms, *-arms])
+        for (x, y), turn in zip(body.centres(), body.turns, strict=True)
+    ])  # fmt: skip
+    return np.column_stack([z.real, z.imag])
 
 
 def pair_of(first: Assembly, second: Assembly) -> Pair:
@@ -69,16 +74,17 @@ def depth_by_hull(first: Floats, second: Floats) -> float:
     return float(-ConvexHull(differences).equations[:, 2].max())
 
 
-def random_overlap(rng: np.random.Generator) -> tuple[Assembly, Assembly]:
+def random_overlap(rng: np.random.Generator, shape: Shape = SQUARE) -> tuple[Assembly, Assembly]:
     """Two assemblies in motion whose first blocks overlap by a tenth of a side at most."""
-    sizes = rng.integers(len(SHAPES), size=2)
+    sizes = rng.integers(len(SHAPES) if shape.on_lattice else len(LAID), size=2)
     bodies = []
-    for k, shape in enumerate(sizes):
+    for k, size in enumerate(sizes):
         pose, motion = rng.uniform(-3, 3, 3), rng.uniform(-1, 1, 3) * [0.1, 0.1, 3.0]
-        bodies.append(rigid(10 * k, SHAPES[shape], pose, motion))
+        make, places = (rigid, SHAPES) if shape.on_lattice else (laid, LAID)
+        bodies.append(make(10 * k, places[size], pose, motion))
     # From far apart along a random line, so far that they overlap by the wanted depth.
     angle, wanted = rng.uniform(0, 2 * np.pi), rng.uniform(1e-5, 0.1 * SIDE)
-    apart, closer = SIDE * np.sqrt(2), 0.0
+    apart, closer = float(np.hypot(*(2 * shape.half))), 0.0
     for _ in range(25):
         middle = (apart + closer) / 2
         shift = middle * np.array([np.cos(angle), np.sin(angle)])
@@ -236,13 +242,14 @@ def strips_one_by_one(
 # --- contacts -------------------------------------------------------------------------------------
 
 
-def test_overlap_is_the_depth_of_the_minkowski_difference() -> None:
+@BOTH_SHAPES
+def test_overlap_is_the_depth_of_the_minkowski_difference(shape: Shape) -> None:
     rng = np.random.default_rng(1)
     signs = set()
     for _ in range(80):
         angles, apart = rng.uniform(-7, 7, 2), rng.uniform(-1.2, 1.2, 2) * SIDE
-        first = one_block(SQUARE, 0, np.array([0.1, 0.2, angles[0]]))
-        second = one_block(SQUARE, 1, np.array([0.1 + apart[0], 0.2 + apart[1], angles[1]]))
+        first = one_block(shape, 0, np.array([0.1, 0.2, angles[0]]))
+        second = one_block(shape, 1, np.array([0.1 + apart[0], 0.2 + apart[1], angles[1]]))
         found = overlap(pair_of(first, second))
         expected = depth_by_hull(corners_of(first), corners_of(second))
         # Outside, the rule takes face axes alone, which tell no more than apart or not.
@@ -255,31 +262,33 @@ def test_overlap_is_the_depth_of_the_minkowski_difference() -> None:
 
 
 @pytest.mark.slow
-def test_contact_points_lie_in_both_blocks() -> None:
+@BOTH_SHAPES
+def test_contact_points_lie_in_both_blocks(shape: Shape) -> None:
     rng = np.random.default_rng(2)
     counts = set()
     for _ in range(80):
-        pair = pair_of(*random_overlap(rng))
+        pair = pair_of(*random_overlap(rng, shape))
         points = contact_points(pair)
         counts.add(len(points))
         depth = overlap(pair).depth
         for point, found in points:
             assert 0 < found <= depth + 1e-12
             for side in (0, 1):
-                angle = -pair.bodies[side].pose[2]
+                angle = -pair.bodies[side].pose[2] - pair.bodies[side].turns[0]
                 x, y = point - pair.centre(side)
                 local = x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
-                assert np.abs(local).max() <= HALF + 1e-12
+                assert (np.abs(local) <= shape.half + 1e-12).all()
     assert counts == {1, 2}
 
 
 @pytest.mark.fast_cases(1)
+@BOTH_SHAPES
 @pytest.mark.parametrize("friction", [0.0, 0.4])
-def test_collisions_keep_momentum_and_never_gain_energy(friction: float) -> None:
+def test_collisions_keep_momentum_and_never_gain_energy(friction: float, shape: Shape) -> None:
     rng = np.random.default_rng(3)
     changed = 0
     for _ in range(80):
-        bodies = random_overlap(rng)
+        bodies = random_overlap(rng, shape)
         before, had = momentum(bodies), energy(bodies)
         restitution = rng.uniform()
         collide(pair_of(*bodies), restitution=restitution, friction=friction, bounce_speed=0.01)
@@ -445,6 +454,21 @@ def test_merging_keeps_momentum_and_angular_momentum_about_the_joint_centre() ->
         centre = made.made.pose
         own_after = after[2] - (centre[0] * after[1] - centre[1] * after[0])
         assert own_after == pytest.approx(own_before, abs=1e-15)
+
+
+def test_rectangles_latch_as_they_lie() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(40):
+        first, second = random_overlap(rng, RECTANGLE)
+        before = momentum([first, second])
+        made = laid_together((first, 0, 0), (second, 10, 0))
+        np.testing.assert_allclose(momentum([made]), before, rtol=0, atol=1e-15)
+        assert overlap(Pair((made, made), (0, 10))).depth == pytest.approx(0.0, abs=1e-15)
+        rows = made.block_poses()
+        for body, part in ((first, rows[: first.size]), (second, rows[first.size :])):
+            moved = part - body.block_poses()
+            np.testing.assert_allclose(np.sin(moved[:, 2]), 0.0, atol=1e-12)
+            np.testing.assert_allclose(moved[:, :2], moved[:1, :2].repeat(len(part), 0), atol=1e-15)
 
 
 @pytest.mark.slow

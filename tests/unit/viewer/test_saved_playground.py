@@ -24,6 +24,7 @@ import driftwalk as dw
 from driftwalk.assembly import assemble
 from driftwalk.assembly.lattice.polyomino import polyominoes
 from driftwalk.assembly.outcomes.class_names import world_class
+from driftwalk.assembly.outcomes.disc_contacts import CONTACT_POLICY, disc_class
 from driftwalk.comparison import apply_steps, ks_distance, ks_reference, plan_steps
 from driftwalk.datasets import tank30_flow, tank30_recording
 from driftwalk.schema.shapes import cells_of_shape
@@ -134,6 +135,41 @@ def test_classes_have_the_names_that_python_gives() -> None:
     )
     found = in_node(named, {"worlds": [world[:3] for world in worlds]})
     assert found == [world[3] for world in worlds]
+
+
+@pytest.mark.parametrize(("noun", "width"), [("discs", None), ("rectangles", 0.02)])
+def test_contact_graphs_have_the_names_that_python_gives(noun: str, width: float | None) -> None:
+    """Clusters on a hexagonal lattice, of rectangles in staggered rows, some turned by 180°."""
+    draw, side = random.Random(2), 0.04
+    worlds = []
+    for world in range(150):
+        pose, label = [], []
+        for number in range(draw.randrange(1, 4)):
+            taken = [(0, 0)]
+            while len(taken) < world % 10 + 1:
+                (column, row), step = draw.choice(taken), draw.choice(range(6))
+                dx, dy = ((1, 0), (0, 1), (-1, 1), (-1, 0), (0, -1), (1, -1))[step]
+                taken += [(column + dx, row + dy)] * ((column + dx, row + dy) not in taken)
+            turn = draw.uniform(-3, 3)
+            height = side * math.sqrt(0.75) if width is None else width
+            for column, row in draw.sample(taken, len(taken)):
+                x, y = side * (column + row / 2), height * row
+                z = complex(x, y) * complex(math.cos(turn), math.sin(turn))
+                pose.append([z.real, z.imag, turn + math.pi * draw.randrange(2)])
+                label.append(number)
+        worlds.append((pose, label, disc_class(np.array(pose), label, diameter=side, width=width)))
+    named = (
+        PRELUDE
+        + """ return given.worlds.map(([pose, assembly]) => graphClass(
+          { pose: pose.flat(), assembly }, { ...given.bodies, gap: given.gap }, 64)); }"""
+    )
+    given = {"noun": noun, "side": side, "width": width}
+    found = in_node(
+        named,
+        {"worlds": [one[:2] for one in worlds], "bodies": given, "gap": CONTACT_POLICY.gap},
+    )
+    assert found == [one[2] for one in worlds]
+    assert len(set(found)) > 100
 
 
 def test_steps_and_their_distance_are_those_of_the_native_core() -> None:

@@ -30,6 +30,8 @@ export const checkLocal = object({
   choices: record(record(anything)),
   chirality: text,
   shape: oneOf("square", "disc", "rectangle"),
+  width: nullable(number),
+  contact_gap: number,
   most_named: number,
   run_steps: number,
   motion,

@@ -162,7 +162,7 @@ class Moving {
       poles: tank.poles(state),
       waiting: tank.waiting,
       outcome,
-      counts: Object.fromEntries(shapeCounts(state, outcome, shape === "square" ? most : 0)),
+      counts: Object.fromEntries(shapeCounts(state, outcome, most)),
       seed: this.seed,
     });
   }
@@ -243,4 +243,4 @@ function serve(): void {
 if (typeof document === "undefined" && typeof addEventListener === "function") serve();
 
 export { LocalTank, MotionWindow, checkLocal, shapeCounts };
-export { className, shapeName } from "./shapes";
+export { className, graphClass, shapeName } from "./shapes";

@@ -2,7 +2,7 @@
 
 import { type Address, worldKey } from "./core";
 import { type Model, putRules } from "./model";
-import { className, sizesName } from "./shapes";
+import { className, graphClass } from "./shapes";
 
 /** What the knobs of a tank stand at. */
 export interface Values {
@@ -153,10 +153,12 @@ export class LocalTank {
     };
   }
 
-  /** Outcome class of the world, as `assemble` names it; of discs and rectangles the sizes of their assemblies. */
+  /** Outcome class of the world, as `assemble` names it. */
   outcome(state: State): string {
-    const { shape, chirality, most_named: most } = this.model.local;
-    return shape === "square" ? className(state, chirality === "merged", most) : sizesName(state);
+    const { shape, chirality, numbers, width, contact_gap: gap, most_named: most } = this.model.local;
+    if (shape === "square") return className(state, chirality === "merged", most);
+    const noun = shape === "disc" ? "discs" : "rectangles";
+    return graphClass(state, { noun, side: numbers.get("side") ?? Number.NaN, width, gap }, most);
   }
 
   /** Poles of the blocks' faces; no rows where faces have no types. */

@@ -91,12 +91,13 @@ function interval(count: number, runs: number): { share: number; low: number; hi
   return { share, low: middle - reach, high: middle + reach };
 }
 
-/** Returns the shapes of a class in a row; nothing of a class that is too long for it. */
+/** Returns the shapes of a class in a row; nothing of a class that is too long for it, or has one without cells. */
 function sketchOf(name: string): Square[] {
   const cells: Square[] = [];
   let left = 0;
   for (const shape of name.split("+")) {
     const own = cellsOfShape(shape);
+    if (own.length === 0) return [];
     cells.push(...own.map(([x, y]): Square => [x + left, y]));
     left = Math.max(left, ...cells.map(([x]) => x + 2));
   }

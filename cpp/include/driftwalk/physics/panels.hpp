@@ -144,10 +144,8 @@ inline auto leave_wall(const WallView<T>& wall, const BodyShape<T>& shape, Real 
   if (any(touched)) {
     resolve_contacts(first, second, wall, per_inertia, motion);
     push_out<Real, T>(first, pose);
-    if (any(second.depth > zero)) {
-      measure(second);
-      push_out<Real, T>(second, pose);
-    }
+    measure(second);
+    push_out<Real, T>(second, pose);
   }
   return touched;
 }

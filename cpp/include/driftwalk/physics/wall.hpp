@@ -328,11 +328,9 @@ inline void leave_circle(const WallView<T>& wall, Real per_inertia, CircleContac
   measure_circle(found.second, wall.radius, pose.x, pose.y);
   resolve_contacts(found.first, found.second, wall, per_inertia, motion);
   push_out<Real, T>(found.first, pose);
-  // The first corner's way out leads the second one inwards too.
-  if (any(found.second.depth > Real(T(0)))) {
-    measure_circle(found.second, wall.radius, pose.x, pose.y);
-    push_out<Real, T>(found.second, pose);
-  }
+  // On a side as long as the tank is wide, the first corner's way out can lead the second outwards.
+  measure_circle(found.second, wall.radius, pose.x, pose.y);
+  push_out<Real, T>(found.second, pose);
 }
 
 // Returns where an edge of a polygon touched the block.

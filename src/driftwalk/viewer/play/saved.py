@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.typed_faces import face_table
+from driftwalk.assembly.outcomes.disc_contacts import CONTACT_POLICY
 from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.plan import Plan, make_plan, whole_steps
 from driftwalk.comparison.significance import steps_memory_time, usual_block_length
@@ -99,6 +100,8 @@ def local_tank(source: PlaySource) -> dict[str, Any]:
         "choices": _choices(source),
         "chirality": study.assembly.chirality,
         "shape": study.block.shape,
+        "width": study.block.width_m,
+        "contact_gap": CONTACT_POLICY.gap,
         "most_named": MOST_NAMED,
         "run_steps": whole_steps(study),
         "motion": _motion(source),
