@@ -45,8 +45,8 @@ class FilterPolicy(NamedTuple):
     positions, whose noise seems to be drag: simulated with 0.3 mm at 10 Hz and 3 cm/s, C_d came
     out 19 % too large with a contact every 0.6 s and right with one every 2 s."""
     settling_samples: int = 3
-    """Samples left out after a missing frame when other explanations of an error are tried: a wrong
-    place counts in the filter's velocity for so long. Chosen by hand."""
+    """Samples left out after a missing frame when other explanations of an error are tried: in
+    these a wrong place counts in the filter's velocity. Chosen by hand."""
     pooled_s: float = 0.1
     """Derivatives of samples within this time [s] hardly differ: their products are made of their
     mean. Measured at 100 Hz: docs/explanation/likelihood.md."""
