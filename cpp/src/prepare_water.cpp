@@ -103,9 +103,9 @@ void PreparedRun<T>::prepare_water(const BatchModel& model, const TableGrid& gri
   water.count = model.frames > 1 ? most_water_tables : 1;
   water.part = 1;
   // Of a body as even as the water that it displaces; of a square a^2/6.
-  const double displaced_inertia =
-      view_.shape.panel_count > 0 ? model.displaced_mass / view_.shape.per_radius_square
-                                  : model.displaced_mass * model.side * model.side / 6;
+  const double displaced_inertia = view_.shape.panel_count > 0
+                                       ? model.displaced_mass / view_.shape.per_radius_square
+                                       : model.displaced_mass * model.side * model.side / 6;
   const double added_mass = model.added_mass_share * model.mass;
   const double added_inertia = model.added_mass_share * model.inertia;
   water.push = static_cast<T>((model.displaced_mass + added_mass) / view_.mass);
