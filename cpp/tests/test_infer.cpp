@@ -271,7 +271,7 @@ void check_that_all_is_written() {
   const Flow flow;
   for (const int strips : {1, 7, 8, 9, 64}) {
     for (const Angle angle : {Angle::given, Angle::none, Angle::state}) {
-      Circle track(40);
+      Circle track(43);
       track.x[0] = track.y[17] = missing;
       track.x[30] = 1e200; // far beyond the grid
       const Outputs out = run(track, drag_model(flow, strips, angle));
