@@ -160,9 +160,9 @@ class PreparedRecordings:
     def facts(self) -> dict[str, Any]:
         """Facts of a fit on its recordings."""
         many = self.recordings
-        gaps = stretches_unsettled(self.series)
+        unsettled = stretches_unsettled(self.series)
         return {
-            **({"stretches_unsettled": gaps} if gaps else {}),
+            **({"stretches_unsettled": unsettled} if unsettled else {}),
             "wall_share": self.wall_share,
             "angle": self.angle if self.study.block.body().symmetry else NO_HEADING,
             "samples": self.samples,
