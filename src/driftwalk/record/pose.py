@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -35,137 +33,6 @@ def angle_between(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array
     angle: Array = np.arctan2(dy, dx)
     angle[(dx == 0.0) & (dy == 0.0)] = np.nan
     return angle
-
-
-Point = tuple[Array, Array, "Array | None"]
-"""x, y and confidence of a keypoint, shape (n,) each; None: the file holds no confidence."""
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """Keypoints that make the pose of a body."""
-
-    position: str
-    """Keypoint that is the body."""
-    heading: tuple[str, str] | None = None
-    """Keypoints from the first of which to the second the body points."""
-
-    def names(self) -> list[str]:
-        """Return the keypoints that have to be read."""
-        return list(dict.fromkeys((self.position, *(self.heading or ()))))
-
-
-@dataclass(frozen=True)
-class Confidence:
-    """Least confidence of a keypoint in a format, unless the user states another one."""
-
-    least: float
-    """Below it a position is missing."""
-    reason: str
-    """Where that number comes from."""
-
-
-def choose_keypoints(names: Sequence[str], options: ReadOptions) -> Chosen:
-    """Return the keypoints that the user named, or the only one.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Keypoints of the file.
-    options : ReadOptions
-        Its `keypoint` and `heading`.
-
-    Raises
-    ------
-    InputError
-        When several could be the body and none is named, or one that is named does not exist.
-    """
-    known = list(dict.fromkeys(names))
-    position = options.keypoint
-    if position is None and len(known) == 1:
-        position = known[0]
-    if position not in known:
-        got = "" if position is None else f" (got '{position}')"
-        raise InputError(f"name the body's keypoint with `keypoint`{got}: {listed(known)}")
-    unknown = [name for name in options.heading or () if name not in known]
-    if unknown:
-        raise InputError(
-            f"`heading`: there is no keypoint '{unknown[0]}'; there are {listed(known)}"
-        )
-    return Chosen(position, options.heading)
-
-
-def recording_of_poses(
-    places: Mapping[str, Mapping[str, Any]],
-    read: Callable[[Any], Point],
-    chosen: Chosen,
-    clock: Array,
-    options: ReadOptions,
-    *,
-    usual: Confidence,
-) -> RawRecording:
-    """Return one body per individual that has the chosen keypoint, and what the user should know.
-
-    Parameters
-    ----------
-    places : mapping
-        Individual to keypoint to its place in the file.
-    read : callable
-        Returns the keypoint at a place as new arrays.
-    chosen : Chosen
-        Which of them make the pose.
-    clock : array, shape (n,)
-        Times or frame numbers of the rows.
-    options : ReadOptions
-        Its `min_confidence`.
-    usual : Confidence
-        Used where `min_confidence` is not given.
-
-    Raises
-    ------
-    InputError
-        When a least confidence is asked for and the file holds no confidences.
-    """
-    stated = options.min_confidence is not None
-    least = usual.least if options.min_confidence is None else options.min_confidence
-    bodies, notes = [], []
-    dropped, known, confident = 0, 0, False
-    for individual, own in places.items():
-        if chosen.position not in own:
-            continue
-        points = {}
-        for name in chosen.names():
-            if name not in own:
-                continue
-            x, y, confidence = read(own[name])
-            seen = np.isfinite(x) & np.isfinite(y)
-            known += int(seen.sum())
-            if confidence is not None and np.isfinite(confidence).any():
-                confident = True
-                unsure = seen & (confidence < least)  # a confidence that is missing says nothing
-                x[unsure] = y[unsure] = np.nan
-                dropped += int(unsure.sum())
-            points[name] = (x, y)
-        theta = None
-        if chosen.heading is not None and set(chosen.heading) <= set(points):
-            theta = angle_between(points[chosen.heading[0]], points[chosen.heading[1]])
-        bodies.append(RawBody(individual, clock, *points[chosen.position], theta))
-    without = [name for name in places if name not in {body.name for body in bodies}]
-    if without:
-        notes.append(f"without the keypoint, and left out: {listed(without)}")
-    if not confident:
-        if stated:
-            raise InputError("the file holds no confidences: leave `min_confidence` out")
-        notes.append("the file holds no confidences: every position counts as seen")
-    else:
-        source, change = (
-            ("", "") if stated else (f" ({usual.reason})", "; `min_confidence` changes it")
-        )
-        notes.append(
-            f"keypoints seen with a confidence below {least:g}{source} are missing: {dropped} of "
-            f"{known}{change}"
-        )
-    return RawRecording(bodies, length_unit="px", has_keypoints=True, notes=notes)
 
 
 def two_names(heading: Sequence[str] | None) -> tuple[str, str] | None:

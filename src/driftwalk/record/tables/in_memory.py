@@ -285,13 +285,17 @@ class MemorySource:
     def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
         """Read columns."""
         if not self.rows:
-            raise FormatError("holds no rows of data")
+            raise self.error("holds no rows of data")
         taken = slice(TABLE.first_rows if head else None)
         used = {*wanted.numbers, *wanted.texts, *wanted.stamps}
         try:
             return table_of({at: self._columns[at][taken] for at in used}, wanted, self._zoned)
         except (CellError, StampError) as error:
-            raise FormatError(f"{error} (row {error.row}, counted from 0)") from error
+            raise self.error_in_row(str(error), error.row) from error
+
+    def error_in_row(self, message: str, row: int) -> FormatError:
+        """Return an error about a row, from 0."""
+        return FormatError(f"{message} (row {row}, counted from 0)")
 
     def error(self, message: str) -> FormatError:
         """Return an error about the table."""

@@ -7,7 +7,6 @@ without executing anything in it: see `record.stores.plain_pickle`.
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.core.files.bounded import MIB, read_bounded
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
@@ -184,7 +183,14 @@ def _drop_unsure(
 def _of_pickle(path: Path) -> _Session:
     content = path.read_bytes()
     if content.startswith(NPY):
-        content = _behind_header(content)
+        header, _, content = content[len(NPY) :].partition(b"\n")
+        if b"'|O'" not in header:
+            with damaged_as("as .npy", path):
+                array = np.load(path, allow_pickle=False)
+            raise FormatError(
+                f"is an array of {array.dtype} of shape {array.shape}, and no dictionary of "
+                "idtracker.ai: save columns of time, x and y as CSV"
+            )
     found = unpickle(content, where="the file")
     if isinstance(found, PickledArray) and len(found.objects()) == 1:
         found = found.objects()[0]
@@ -201,28 +207,6 @@ def _of_pickle(path: Path) -> _Session:
     trajectories = array("trajectories")
     assert trajectories is not None
     return _Session(trajectories, lambda: array(PROBABILITIES), found)
-
-
-def _behind_header(content: bytes) -> bytes:
-    """Return the pickle of an array of objects in NumPy's file."""
-    file = io.BytesIO(content)
-    try:
-        version = np.lib.format.read_magic(file)
-        read = (
-            np.lib.format.read_array_header_1_0
-            if version == (1, 0)
-            else np.lib.format.read_array_header_2_0
-        )
-        shape, _, kind = read(file)
-    except Exception as error:
-        # NumPy parses the header as Python, and fails with whatever damage leads it to.
-        raise FormatError(f"has a damaged header: {type(error).__name__}") from error
-    if kind.kind != "O":
-        raise FormatError(
-            f"is an array of {kind} of shape {shape}, and no dictionary of idtracker.ai: save "
-            "columns of time, x and y as CSV"
-        )
-    return content[file.tell() :]
 
 
 def _of_hdf5(path: Path) -> _Session:

@@ -13,8 +13,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.several_bodies import split_numbered
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
-from driftwalk.record.stores.pandas_frame import Frame, frame_in
+from driftwalk.record.stores.hdf5 import Frame, Hdf5Contents, frame_in, names_in, opened_hdf5
 from driftwalk.record.text import read_table
 from driftwalk.record.text_head import first_names, first_row
 from driftwalk.schema.stores.netcdf import HDF5, file_start
