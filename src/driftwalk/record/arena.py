@@ -247,8 +247,8 @@ def _outside(beyond: Array, size: float, reach: Reach) -> list[str]:
 @naming_its_file
 def _polygon(path: Path) -> PlacedArena:
     from driftwalk.record.raw import TableLayout
+    from driftwalk.record.tables.text_source import read_header
     from driftwalk.record.text import read_table
-    from driftwalk.record.text_head import read_header
 
     names, delimiter, skip, has_header = read_header(path)
     if len(names) != 2 or (has_header and names != ["x_m", "y_m"]):

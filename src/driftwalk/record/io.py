@@ -20,8 +20,7 @@ from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
 from driftwalk.record.cleaning.clean import Counts, clean_body
 from driftwalk.record.cleaning.clock import check_clock, unwrap_counters
 from driftwalk.record.cleaning.jumps import arena_diagonal, impossible_steps, impossible_warning
-from driftwalk.record.cleaning.missing import blank_missing, mark_warnings
-from driftwalk.record.cleaning.outliers import without_far_outliers
+from driftwalk.record.cleaning.outliers import blank_missing, mark_warnings, without_far_outliers
 from driftwalk.record.cleaning.warn import (
     angle_warnings,
     plausibility_warnings,
@@ -30,10 +29,9 @@ from driftwalk.record.cleaning.warn import (
 )
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.noise import noise_reach
-from driftwalk.record.origin import origin_of
 from driftwalk.record.pose import join_markers, two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.registry import PLAIN
+from driftwalk.record.registry import PLAIN, origin_of
 from driftwalk.schema import Track, body_names, build_trajectory, check_trajectory
 from driftwalk.schema.stores.netcdf import netcdf_bytes
 

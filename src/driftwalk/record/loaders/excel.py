@@ -12,11 +12,15 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stores.npz import ZIP, refuse_huge_zip, zip_names
-from driftwalk.record.tables.heading import header_advice, heading_of, is_data, units_below
-from driftwalk.record.tables.in_memory import MemorySource, objects, text_of_cell
+from driftwalk.record.tables.in_memory import TABLE, MemorySource, objects, text_of_cell
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
-from driftwalk.record.tables.source import TABLE
-from driftwalk.record.text_head import is_numeric_row
+from driftwalk.record.tables.text_source import (
+    header_advice,
+    heading_of,
+    is_data,
+    is_numeric_row,
+    units_below,
+)
 from driftwalk.schema.stores.netcdf import file_start
 
 if TYPE_CHECKING:

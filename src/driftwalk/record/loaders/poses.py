@@ -22,7 +22,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError, InputError, listed
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.cleaning.several_bodies import split_bodies
+from driftwalk.record.cleaning.clean import split_bodies
 from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import (
     LENGTH_UNITS,
@@ -34,8 +34,8 @@ from driftwalk.record.raw import (
     TableLayout,
 )
 from driftwalk.record.stores.hdf5 import Hdf5Contents, frame_in, names_in, opened_hdf5, text_of
+from driftwalk.record.tables.text_source import first_names, first_row
 from driftwalk.record.text import header_rows, read_table
-from driftwalk.record.text_head import first_names, first_row
 from driftwalk.schema.stores.netcdf import HDF5, MAGIC, file_start, open_netcdf, text_attribute
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Columns in memory as a table, their values as numbers, names or time stamps.
+"""Tables: their interface to the reader, and columns in memory with numbers, names or time stamps.
 
 Data frames, arrays, a mapping of columns.
 """
@@ -10,7 +10,7 @@ import datetime
 import math
 import numbers
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,6 @@ from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.raw import MISSING, Array, TableLayout
-from driftwalk.record.tables.source import TABLE
 from driftwalk.record.tables.stamps import (
     MOMENT,
     OF_DAY,
@@ -32,6 +31,55 @@ from driftwalk.record.tables.stamps import (
     stamp_form,
 )
 from driftwalk.record.text import Table, far_origin
+
+
+class TablePolicy(NamedTuple):
+    """How much of a table is looked at before it is read."""
+
+    heading_rows: int = 100
+    """Rows among which are the names of the columns and the first row of data; chosen by hand."""
+    sample_rows: int = 50
+    """Rows by which a table is recognised; chosen by hand."""
+    first_rows: int = 100_000
+    """Rows that are read where only the first ones are needed; chosen by hand."""
+
+
+TABLE: Final = TablePolicy()
+
+
+class TableSource(Protocol):
+    """A table with one row per sample."""
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the columns, ``""`` where there is none."""
+
+    @property
+    def units(self) -> list[str]:
+        """Units in a row below the names; empty where there is no such row."""
+
+    @property
+    def has_header(self) -> bool:
+        """Whether the columns have names."""
+
+    def sample(self) -> list[list[str]]:
+        """Return the first rows as texts."""
+
+    def stamps(self, column: int, /) -> StampForm | None:
+        """Return how the first time stamp of a column is written, None where it has none."""
+
+    def read(self, wanted: TableLayout, /, *, head: bool = False) -> Table:
+        """Read the columns that a layout names; of the `head` no more than the first rows.
+
+        Raises
+        ------
+        FormatError
+            When a row or a field cannot be read.
+        """
+
+    def error(self, message: str, /) -> FormatError:
+        """Return an error about the header, or the table where it has none."""
+
 
 Values = npt.NDArray[Any]
 

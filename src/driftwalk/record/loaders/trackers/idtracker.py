@@ -19,14 +19,14 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.core.files.bounded import MIB, read_bounded
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
+from driftwalk.record.cleaning.clean import number_codes, split_bodies
 from driftwalk.record.loaders.plain import side_by_side
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.npz import NPY
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
+from driftwalk.record.tables.text_source import first_line, first_row
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_line, first_row
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 _POSITION = re.compile(r"(?P<axis>[XY])(?P<body>\d+)")

@@ -25,10 +25,10 @@ import numpy as np
 
 from driftwalk.core.arrays import Codes, Integers
 from driftwalk.core.errors import FormatError, naming_its_file
-from driftwalk.record.cleaning.several_bodies import order_in_frame, split_bodies
+from driftwalk.record.cleaning.clean import order_in_frame, split_bodies
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.tables.text_source import first_line, first_lines
 from driftwalk.record.text import Table, lines_of, open_binary, read_head, read_table
-from driftwalk.record.text_head import first_line, first_lines
 
 OLD = ["frame", "x (image)", "y (image)", "x (world)", "y (world)", "area", "orientation"]
 OLD = [*OLD, "compactness", "time stamp"]

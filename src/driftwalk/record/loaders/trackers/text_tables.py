@@ -25,7 +25,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.cleaning.several_bodies import (
+from driftwalk.record.cleaning.clean import (
     codes_in_arenas,
     number_codes,
     split_bodies,
@@ -36,14 +36,14 @@ from driftwalk.record.loaders.plain import HeadedFormat, described, side_by_side
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.tables.in_memory import MemorySource
 from driftwalk.record.tables.rows import recording_of
-from driftwalk.record.text import header_rows, read_head, read_table
-from driftwalk.record.text_head import (
+from driftwalk.record.tables.text_source import (
     first_line,
     first_lines,
     first_row,
     is_numeric_row,
     read_header,
 )
+from driftwalk.record.text import header_rows, read_head, read_table
 
 ANIMALTA: Final = ("Frame", "Time", "Arena", "Ind", "X", "Y")
 HALF_DIGIT_S: Final = 0.0051

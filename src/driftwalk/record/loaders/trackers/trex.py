@@ -20,8 +20,8 @@ from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.npz import ZIP, members, opened_npz
+from driftwalk.record.tables.text_source import first_names, first_row
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_names, first_row
 from driftwalk.schema.stores.netcdf import file_start
 
 CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")
