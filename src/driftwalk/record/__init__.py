@@ -18,7 +18,7 @@ from driftwalk.record.cleaning.outliers import (
     without_outliers,
 )
 from driftwalk.record.info import describe
-from driftwalk.record.io import load, readable_formats, save_trajectory
+from driftwalk.record.io import load, readable_formats
 from driftwalk.record.noise import (
     NoiseBound,
     NoiseEstimate,
@@ -26,6 +26,7 @@ from driftwalk.record.noise import (
     noise_bound,
     noise_reach,
 )
+from driftwalk.schema.trajectory import save_trajectory
 
 __all__ = [
     "CircleFit",

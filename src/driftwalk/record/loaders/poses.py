@@ -218,7 +218,7 @@ class DeepLabCutLoader:
                 levels = [*frame.columns]
                 if any(len(column) not in (3, 4) for column in levels):
                     raise FormatError(f"'{key}' has no columns of scorer, bodyparts, coords")
-                places, clock = _bodyparts(levels, 0), frame.index()
+                places, clock = _bodyparts(levels, 0), frame.labels()
                 return _of_columns(places, frame.numbers, clock, options, OF_DEEPLABCUT)
         header = _header(path)
         columns = [*zip(*header, strict=True)]

@@ -161,7 +161,7 @@ class Frame(NamedTuple):
             raise FormatError(f"column '{'.'.join(name)}' of '{self.key}' holds no numbers")
         return np.array(values, dtype=np.float64)
 
-    def index(self) -> Array:
+    def labels(self) -> Array:
         """Return the labels of the rows; they are numbered where they are no numbers."""
         if self.rows is None:
             return np.arange(self.numbers(0).size, dtype=np.float64)

@@ -336,10 +336,36 @@ class MemorySource:
             raise self.error("holds no rows of data")
         taken = slice(TABLE.first_rows if head else None)
         used = {*wanted.numbers, *wanted.texts, *wanted.stamps}
+        columns = {at: self._columns[at][taken] for at in used}
         try:
-            return table_of({at: self._columns[at][taken] for at in used}, wanted, self._zoned)
+            return self._table(columns, wanted)
         except (CellError, StampError) as error:
             raise self.error_in_row(str(error), error.row) from error
+
+    def _table(self, columns: Mapping[int, Values], wanted: TableLayout) -> Table:
+        """Return the numbers, names and times of columns."""
+        origin, calendar, numbers = 0, "", {}
+        if wanted.clock is not None:
+            origin = far_origin(np.asarray(columns[wanted.clock]))
+        for at in wanted.numbers:
+            values = columns[at] - origin if origin and at == wanted.clock else columns[at]
+            numbers[at] = as_numbers(values, wanted.names[at])
+        names = {at: as_names(columns[at]) for at in wanted.texts}
+        if wanted.stamps:
+            readers = {at: StampReader() for at in wanted.stamps}
+            ticks = [as_ticks(columns[at], reader) for at, reader in readers.items()]
+            for at, reader in readers.items():
+                reader.zoned |= at in self._zoned
+            numbers[wanted.stamps[0]], first = clock_of_stamps(ticks, None)
+            origin, calendar = first or 0, calendar_of([*readers.values()])
+        return Table(
+            rows=next(iter(columns.values())).size,
+            numbers=numbers,
+            codes={at: codes for at, (codes, _) in names.items()},
+            labels={at: found for at, (_, found) in names.items()},
+            clock_origin=origin,
+            calendar=calendar,
+        )
 
     def error_in_row(self, message: str, row: int) -> FormatError:
         """Return an error about a row, from 0."""
@@ -348,42 +374,6 @@ class MemorySource:
     def error(self, message: str) -> FormatError:
         """Return an error about the table."""
         return FormatError(message)
-
-
-def table_of(
-    columns: Mapping[int, Values], wanted: TableLayout, zoned: frozenset[int] = frozenset()
-) -> Table:
-    """Return the numbers, names and times of columns.
-
-    Raises
-    ------
-    CellError, StampError
-        At the first value that is not of the kind that its column has to be of.
-    """
-    origin, numbers = 0, {}
-    if wanted.clock is not None:
-        origin = far_origin(np.asarray(columns[wanted.clock]))
-    for at in wanted.numbers:
-        values = columns[at] - origin if origin and at == wanted.clock else columns[at]
-        numbers[at] = as_numbers(values, wanted.names[at])
-    names = {at: as_names(columns[at]) for at in wanted.texts}
-    calendar = ""
-    if wanted.stamps:
-        readers = [StampReader() for _ in wanted.stamps]
-        pairs = zip(wanted.stamps, readers, strict=True)
-        ticks = [as_ticks(columns[at], reader) for at, reader in pairs]
-        for at, reader in zip(wanted.stamps, readers, strict=True):
-            reader.zoned |= at in zoned
-        numbers[wanted.stamps[0]], first = clock_of_stamps(ticks, None)
-        origin, calendar = first or 0, calendar_of(readers)
-    return Table(
-        rows=next(iter(columns.values())).size,
-        numbers=numbers,
-        codes={at: codes for at, (codes, _) in names.items()},
-        labels={at: found for at, (_, found) in names.items()},
-        clock_origin=origin,
-        calendar=calendar,
-    )
 
 
 def table_in_memory(data: Any) -> MemorySource:

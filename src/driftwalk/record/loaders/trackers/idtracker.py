@@ -186,9 +186,9 @@ def _of_pickle(path: Path) -> _Session:
         header, _, content = content[len(NPY) :].partition(b"\n")
         if b"'|O'" not in header:
             with damaged_as("as .npy", path):
-                array = np.load(path, allow_pickle=False)
+                stored = np.load(path, allow_pickle=False)
             raise FormatError(
-                f"is an array of {array.dtype} of shape {array.shape}, and no dictionary of "
+                f"is an array of {stored.dtype} of shape {stored.shape}, and no dictionary of "
                 "idtracker.ai: save columns of time, x and y as CSV"
             )
     found = unpickle(content, where="the file")

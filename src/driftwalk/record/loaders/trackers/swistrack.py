@@ -28,7 +28,7 @@ from driftwalk.core.errors import FormatError, naming_its_file
 from driftwalk.record.cleaning.clean import order_in_frame, split_bodies
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.tables.text_source import first_line, first_lines
-from driftwalk.record.text import Table, lines_of, open_binary, read_head, read_table
+from driftwalk.record.text import Table, blocks_of, read_head, read_table
 
 OLD = ["frame", "x (image)", "y (image)", "x (world)", "y (world)", "area", "orientation"]
 OLD = [*OLD, "compactness", "time stamp"]
@@ -94,7 +94,7 @@ def _recording(
 
 
 def _of_particles(
-    rows: Sequence[Array],
+    rows: Array | Sequence[Array],
     codes: Codes,
     names: list[str],
     clock_unit: str,
@@ -208,10 +208,10 @@ class SwisTrackNmeaLoader:
         # Some senders give every particle the same id: then only their order tells them apart.
         repeated = np.unique(np.stack([frame, ids]), axis=1).shape[1] < frame.size
         names = [str(index) for index in (range(int(order.max()) + 1) if repeated else labels)]
-        codes = order if repeated else codes.astype(np.int32)
+        of_row = order if repeated else codes.astype(np.int32)
         note = "ids repeat within a frame: bodies are distinguished by their order in the frame"
         note = note if repeated else ""
-        return _of_particles(values, codes, names, "frame", options, note)
+        return _of_particles(values, of_row, names, "frame", options, note)
 
 
 def _particles(path: Path) -> tuple[Array, Integers]:
@@ -219,8 +219,8 @@ def _particles(path: Path) -> tuple[Array, Integers]:
     values = array("d")
     ids = array("q")
     frame = float("nan")
-    with open_binary(path) as file:
-        for line, raw in lines_of(file):
+    for first, block in blocks_of(path):
+        for line, raw in enumerate(block.split(b"\n"), start=first):
             text = raw.strip()
             if text.startswith((b"$FRAMENUMBER,", b"$PARTICLE,")):
                 command, *arguments = _verified(text, line).split(",")
