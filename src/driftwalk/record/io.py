@@ -18,7 +18,7 @@ from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
 from driftwalk.record.cleaning.clean import Counts, clean_body
 from driftwalk.record.cleaning.clock import check_clock, unwrap_counters
 from driftwalk.record.cleaning.jumps import arena_diagonal, impossible_steps, impossible_warning
-from driftwalk.record.cleaning.outliers import blank_missing, mark_warnings, without_far_outliers
+from driftwalk.record.cleaning.missing import blank_missing, mark_warnings
 from driftwalk.record.cleaning.warn import (
     angle_warnings,
     plausibility_warnings,
@@ -26,11 +26,11 @@ from driftwalk.record.cleaning.warn import (
     refuse_sparse,
 )
 from driftwalk.record.convert_units import convert_units
-from driftwalk.record.noise import noise_reach
 from driftwalk.record.pose import join_markers, two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN, origin_of
 from driftwalk.schema import Track, build_trajectory
+from driftwalk.schema.tracker_errors import noise_reach, without_far_outliers
 
 if TYPE_CHECKING:
     import numpy.typing as npt
