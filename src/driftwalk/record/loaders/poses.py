@@ -41,8 +41,8 @@ from driftwalk.schema.stores.netcdf import HDF5, MAGIC, file_start, open_netcdf,
 if TYPE_CHECKING:
     import xarray as xr
 
-Point = tuple[Array, Array, "Array | None"]
-"""x, y and confidence of a keypoint, shape (n,) each; None: the file holds no confidence."""
+Places = Mapping[str, Mapping[str, Mapping[str, Any]]]
+"""Individual to keypoint to x, y and likelihood, where there is one, to where its values are."""
 Confidence = tuple[float, str]
 """Least confidence of a keypoint in a format, and where that number comes from."""
 OF_DEEPLABCUT: Final = (0.6, "DeepLabCut's pcutoff")
@@ -68,15 +68,15 @@ def _chosen(places: Mapping[str, Iterable[str]], options: ReadOptions) -> list[s
 
 
 def _recording(
-    places: Mapping[str, Mapping[str, Any]],
-    read: Callable[[Any], Point],
+    places: Places,
+    values: Callable[[Any], Array],
     clock: Array,
     options: ReadOptions,
     usual: Confidence,
 ) -> RawRecording:
     """Return one body per individual that has the chosen keypoint, and what the user should know.
 
-    `read` returns the keypoint at one of the places of individuals and keypoints, as new arrays.
+    `values` returns what is at one of the places, as a new array of shape (n,).
     """
     names = _chosen(places, options)
     stated = options.min_confidence is not None
@@ -90,7 +90,8 @@ def _recording(
         for name in names:
             if name not in own:
                 continue
-            x, y, confidence = read(own[name])
+            x, y = (values(own[name][axis]) for axis in "xy")
+            confidence = values(own[name]["likelihood"]) if "likelihood" in own[name] else None
             seen = np.isfinite(x) & np.isfinite(y)
             known += int(seen.sum())
             if confidence is not None and np.isfinite(confidence).any():
@@ -119,13 +120,11 @@ def _recording(
     return RawRecording(bodies, length_unit="px", has_keypoints=True, notes=notes)
 
 
-Places = dict[str, dict[str, dict[str, int]]]
-"""Individual to keypoint to coordinate to column."""
-
-
-def _places(columns: Iterable[tuple[int, tuple[str, ...]]]) -> Places:
+def _places(
+    columns: Iterable[tuple[int, tuple[str, ...]]],
+) -> dict[str, dict[str, dict[str, int]]]:
     """Return the columns of coordinates of individuals' keypoints; other ones are left out."""
-    found: Places = {}
+    found: dict[str, dict[str, dict[str, int]]] = {}
     for at, (individual, part, coordinate) in columns:
         if coordinate in ("x", "y", "likelihood"):
             found.setdefault(individual, {}).setdefault(part, {})[coordinate] = at
@@ -137,22 +136,6 @@ def _used(places: Places, options: ReadOptions) -> set[int]:
     names = _chosen(places, options)
     used = (own.get(name, {}) for own in places.values() for name in names)
     return {at for place in used for at in place.values()}
-
-
-def _of_columns(
-    places: Places,
-    column: Callable[[int], Array],
-    clock: Array,
-    options: ReadOptions,
-    usual: Confidence,
-) -> RawRecording:
-    """Return the recording of a table with a column for each coordinate of a keypoint."""
-
-    def point(place: dict[str, int]) -> Point:
-        likelihood = column(place["likelihood"]) if "likelihood" in place else None
-        return column(place["x"]), column(place["y"]), likelihood
-
-    return _recording(places, point, clock, options, usual)
 
 
 def _of_arrays(
@@ -170,16 +153,20 @@ def _of_arrays(
     if confidence is not None and confidence.shape != (position.shape[0], *position.shape[2:]):
         raise FormatError(f"'{confidence.name}' has another shape than '{position.name}'")
 
-    def point(place: tuple[int, int]) -> Point:
-        x, y = (np.array(position.values[:, axis, *place], dtype=np.float64) for axis in (0, 1))
-        known = None if confidence is None else confidence.values[:, *place].astype(np.float64)
-        return x, y, known
-
+    arrays = {"x": position[:, 0], "y": position[:, 1]}
+    arrays |= {} if confidence is None else {"likelihood": confidence}
     places = {
-        individual: {keypoint: (at, of) for at, keypoint in enumerate(names[0])}
+        individual: {
+            keypoint: {name: (name, at, of) for name in arrays}
+            for at, keypoint in enumerate(names[0])
+        }
         for of, individual in enumerate(names[1])
     }
-    return _recording(places, point, clock, options, usual)
+
+    def values(place: tuple[str, int, int]) -> Array:
+        return np.array(arrays[place[0]].values[:, *place[1:]], dtype=np.float64)
+
+    return _recording(places, values, clock, options, usual)
 
 
 def _in_order(values: xr.DataArray, *order: str) -> xr.DataArray:
@@ -219,14 +206,14 @@ class DeepLabCutLoader:
                 if any(len(column) not in (3, 4) for column in levels):
                     raise FormatError(f"'{key}' has no columns of scorer, bodyparts, coords")
                 places, clock = _bodyparts(levels, 0), frame.labels()
-                return _of_columns(places, frame.numbers, clock, options, OF_DEEPLABCUT)
+                return _recording(places, frame.numbers, clock, options, OF_DEEPLABCUT)
         header = _header(path)
         columns = [*zip(*header, strict=True)]
         places = _bodyparts(columns[1:], 1)
         names = [".".join(filter(None, column)) for column in columns]
         wanted = (0, *sorted(_used(places, options)))
         numbers = read_table(path, TableLayout(",", names, len(header), wanted)).numbers
-        return _of_columns(places, numbers.__getitem__, numbers[0], options, OF_DEEPLABCUT)
+        return _recording(places, numbers.__getitem__, numbers[0], options, OF_DEEPLABCUT)
 
 
 def _header(path: Path) -> list[list[str]]:
@@ -342,7 +329,7 @@ class SleapCsvLoader:
         texts = () if track is None else (track,)
         table = read_table(path, TableLayout(",", names, 1, wanted, texts))
         numbers = table.numbers
-        raw = _of_columns({"0": nodes}, numbers.__getitem__, numbers[frame], options, OF_SLEAP)
+        raw = _recording({"0": nodes}, numbers.__getitem__, numbers[frame], options, OF_SLEAP)
         if track is not None:
             (rows,) = raw.bodies
             raw.bodies = split_bodies(rows, table.codes[track], table.labels[track])
