@@ -17,7 +17,7 @@ from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -228,12 +228,12 @@ def loaders() -> dict[str, Loader]:
     >>> "idtracker" in loaders()
     True
     """
-    return {**_own_loaders(), **_foreign().loaders}
+    return {**_own_loaders(), **_foreign()[0]}
 
 
 @cache
-def _foreign() -> ForeignLoaders:
-    """Return the loaders of other packages."""
+def _foreign() -> tuple[dict[str, ForeignLoader], dict[str, str]]:
+    """Return the loaders of other packages, and what is wrong with the broken ones."""
     return foreign_loaders(_own_loaders())
 
 
@@ -269,7 +269,7 @@ def find_loader(path: Path, *, format: str | None = None, by_columns: bool = Fal
         When there is no such format or file, or nothing recognises the content.
     """
     known = loaders()
-    broken = _foreign().broken
+    broken = _foreign()[1]
     if format is not None and format not in known:
         if format in broken:
             raise InputError(f"`format` '{format}': {broken[format]}")
@@ -296,15 +296,6 @@ def find_loader(path: Path, *, format: str | None = None, by_columns: bool = Fal
 
 GROUP: Final = "driftwalk.loaders"
 _MEMBERS: Final = ("name", "description", "sniff", "read")
-
-
-class ForeignLoaders(NamedTuple):
-    """Loaders that the installed packages offer, and entry points that are broken."""
-
-    loaders: dict[str, ForeignLoader]
-    """Those that can be used, by the names of their formats."""
-    broken: dict[str, str]
-    """Names of entry points to what is wrong with them, with their package."""
 
 
 class ForeignLoader:
@@ -353,8 +344,12 @@ class ForeignLoader:
         return recording
 
 
-def foreign_loaders(taken: Container[str]) -> ForeignLoaders:
-    """Return the loaders of the installed packages.
+def foreign_loaders(
+    taken: Container[str],
+) -> tuple[dict[str, ForeignLoader], dict[str, str]]:
+    """Return the loaders of the installed packages, and what is wrong with the broken ones.
+
+    Both by name: of the format, and of the entry point.
 
     Parameters
     ----------
@@ -363,8 +358,8 @@ def foreign_loaders(taken: Container[str]) -> ForeignLoaders:
 
     Examples
     --------
-    >>> sorted(foreign_loaders([]).broken)
-    []
+    >>> foreign_loaders([])[1]
+    {}
     """
     found: dict[str, ForeignLoader] = {}
     broken: dict[str, str] = {}
@@ -387,7 +382,7 @@ def foreign_loaders(taken: Container[str]) -> ForeignLoaders:
             )
         else:
             found[foreign.name] = foreign
-    return ForeignLoaders(found, broken)
+    return found, broken
 
 
 def _package(point: EntryPoint) -> str:

@@ -261,8 +261,6 @@ def _ctrax(value: Value) -> RawRecording | None:
         first = _one_number(one["firstframe"], 1.0)
         frames = np.arange(x.size, dtype=np.float64) + (first - 1.0)
         clock = _values(one["timestamps"]) if stamped else frames
-        if x.size != y.size or clock.size != x.size or (theta is not None and theta.size != x.size):
-            raise FormatError(f"body {at} of 'trx' has x, y and theta of different lengths")
         name = _one_number(one.get("id"), float(at))
         bodies.append(RawBody(f"{name:g}", clock, x, y, theta))
     rate = _one_number(value.elements[0].get("fps"), 0.0)

@@ -58,19 +58,6 @@ class Hdf5Contents:
         refuse_huge(self._declared, self.path)
         return np.asarray(entry[()])
 
-    def numbers(self, name: str) -> Array:
-        """Return the values of an array of numbers as float64, which nobody else holds.
-
-        Raises
-        ------
-        FormatError
-            As `array`, and when it holds no numbers.
-        """
-        values = self.array(name)
-        if values.dtype.kind not in "fiub":
-            raise FormatError(f"'{name}' holds no numbers")
-        return np.array(values, dtype=np.float64)
-
     def texts(self, name: str) -> list[str]:
         """Return the values of a one-dimensional array of texts.
 
@@ -145,7 +132,7 @@ class Frame(NamedTuple):
     key: str
     columns: dict[Column, npt.NDArray[Any] | None]
     """From the name of each column, by level, to its numbers; None where it holds none."""
-    rows: Array | None
+    rows: npt.NDArray[Any] | None
 
     def numbers(self, column: int) -> Array:
         """Return a column as float64.
@@ -163,9 +150,8 @@ class Frame(NamedTuple):
 
     def labels(self) -> Array:
         """Return the labels of the rows; they are numbered where they are no numbers."""
-        if self.rows is None:
-            return np.arange(self.numbers(0).size, dtype=np.float64)
-        return self.rows
+        rows = np.arange(self.numbers(0).size) if self.rows is None else self.rows
+        return np.array(rows, dtype=np.float64)
 
 
 def frame_in(contents: Hdf5Contents, key: str) -> Frame:
@@ -209,7 +195,7 @@ def _fixed(contents: Hdf5Contents, key: str, group: Any) -> Frame:
         names = _labels(contents, key, f"block{block}_items", group)
         columns |= _columns(names, contents.array(f"{key}/block{block}_values"))
     numbered = "axis1" in group and group["axis1"].dtype.kind in "iuf"
-    return Frame(key, columns, contents.numbers(f"{key}/axis1") if numbered else None)
+    return Frame(key, columns, contents.array(f"{key}/axis1") if numbered else None)
 
 
 def _columns(
@@ -248,8 +234,7 @@ def _table(contents: Hdf5Contents, key: str, group: Any) -> Frame:
             values = values.reshape(len(values), -1) if len(values) else values[:, None]
             columns |= _columns(_pickled(group, f"{name}_kind"), values)
     numbered = "index" in fields and stored["index"].dtype.kind in "iuf"
-    rows = np.array(stored["index"], dtype=np.float64) if numbered else None
-    return Frame(key, columns, rows)
+    return Frame(key, columns, stored["index"] if numbered else None)
 
 
 def _pickled(group: Any, attribute: str) -> list[Column]:

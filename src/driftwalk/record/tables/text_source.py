@@ -321,19 +321,17 @@ class TextSource:
             if len(below) > 1 and (units := units_below(self.names, below[0], options)):
                 self.units, self._skip = units, begin + 2
             return
-        for at, line in enumerate(lines):
-            if not line.strip():
-                continue
+        filled = [at for at, line in enumerate(lines) if line.strip()]
+        for number, at in enumerate(filled):
             here = self._delimiter if not at else None
             delimiter = options.delimiter or here or detect_delimiter(lines[at : at + 2])
-            below_at = [n for n in range(at + 1, len(lines)) if lines[n].strip()][:2]
-            texts = [line.lstrip("# ").removeprefix("% "), *(lines[n] for n in below_at)]
-            rows = [split_fields(one, delimiter) for one in texts]
-            found = heading_of(rows, options)
+            first, *others = (lines[one] for one in filled[number : number + 3])
+            texts = [first.lstrip("# ").removeprefix("% "), *others]
+            found = heading_of([split_fields(one, delimiter) for one in texts], options)
             if found is not None:
-                if at or found.rows > 1 or line.startswith("% "):
+                if at or found.rows > 1 or first.startswith("% "):
                     self.names, self.units, self._delimiter = found.names, found.units, delimiter
-                    self._skip = begin + [at, *below_at][found.rows - 1] + 1
+                    self._skip = begin + filled[number + found.rows - 1] + 1
                 # LabVIEW names a last column "Comment" and leaves it out.
                 if self.names[-1:] == ["Comment"] and len(self._rows[0]) == len(self.names) - 1:
                     self.names = self.names[:-1]
