@@ -20,8 +20,8 @@ from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
 from driftwalk.record.stores.npz import NPY, ZIP, members, opened_npz
 from driftwalk.record.tables.in_memory import table_in_memory
 from driftwalk.record.tables.matlab import (
-    Struct,
     Value,
+    elements_of,
     matlab_tables,
     matlab_variables_of,
     only_matlab,
@@ -109,7 +109,7 @@ def _of_arrays(variables: dict[str, Value], options: ReadOptions) -> RawRecordin
 def _value(array: np.ndarray[Any, Any]) -> Value:
     """Return an array in the form of a MATLAB variable: with two axes."""
     if array.dtype.names is not None:
-        return Struct([{name: _value(array[name]) for name in array.dtype.names}])
+        return [{name: _value(array[name]) for name in array.dtype.names}]
     if array.dtype.kind in "SU":
         return [one.decode() if isinstance(one, bytes) else str(one) for one in array.ravel()]
     if array.dtype.kind == "M":
@@ -124,15 +124,12 @@ def _of_hdf5(contents: Hdf5Contents) -> dict[str, Value]:
     found: dict[str, Value] = {}
     for name, entry in contents.file.items():
         if hasattr(entry, "keys"):
-            inner = [one for one in entry if hasattr(entry[one], "shape")]
-            found[str(name)] = Struct(
-                [
-                    {
-                        _with_unit(str(one), entry[one]): _value(contents.array(f"{name}/{one}"))
-                        for one in inner
-                    }
-                ]
-            )
+            inner = {str(one): entry[one] for one in entry if hasattr(entry[one], "shape")}
+            fields = {
+                _with_unit(one, array): _value(contents.array(f"{name}/{one}"))
+                for one, array in inner.items()
+            }
+            found[str(name)] = [fields]
         elif hasattr(entry, "shape"):
             found[_with_unit(str(name), entry)] = _value(contents.array(str(name)))
     found |= {
@@ -245,17 +242,16 @@ def _tracks(path: Path) -> RawRecording | None:
 
 def _ctrax(value: Value) -> RawRecording | None:
     """Return the bodies of Ctrax: millimetres where it knows them, y as in the image."""
-    if not isinstance(value, Struct) or not value.elements:
+    elements = elements_of(value)
+    if not elements or not {"x", "y", "firstframe"} <= set(elements[0]):
         return None
-    if not {"x", "y", "firstframe"} <= set(value.elements[0]):
-        return None
-    scaled = {"x_mm", "y_mm"} <= set(value.elements[0])
+    scaled = {"x_mm", "y_mm"} <= set(elements[0])
     stamped = all(
         "timestamps" in one and _values(one["timestamps"]).size == _values(one["x"]).size > 0
-        for one in value.elements
+        for one in elements
     )
     bodies = []
-    for at, one in enumerate(value.elements, start=1):
+    for at, one in enumerate(elements, start=1):
         x, y = (_values(one[f"{axis}_mm" if scaled else axis]) for axis in "xy")
         theta = _values(one["theta"]) if "theta" in one else None
         first = _one_number(one["firstframe"], 1.0)
@@ -263,7 +259,7 @@ def _ctrax(value: Value) -> RawRecording | None:
         clock = _values(one["timestamps"]) if stamped else frames
         name = _one_number(one.get("id"), float(at))
         bodies.append(RawBody(f"{name:g}", clock, x, y, theta))
-    rate = _one_number(value.elements[0].get("fps"), 0.0)
+    rate = _one_number(elements[0].get("fps"), 0.0)
     return RawRecording(
         bodies,
         clock_unit="s" if stamped else "frame",
@@ -276,7 +272,7 @@ def _ctrax(value: Value) -> RawRecording | None:
 
 def _flytracker(value: Value) -> RawRecording | None:
     """Return the bodies of FlyTracker: pixels, y down, but angles with y up."""
-    fields = value.elements[0] if isinstance(value, Struct) and value.elements else {}
+    fields = next(iter(elements_of(value)), {})
     names, data = fields.get("names"), fields.get("data")
     if not isinstance(names, list) or not isinstance(data, np.ndarray) or data.ndim not in (2, 3):
         return None

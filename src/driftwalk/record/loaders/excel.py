@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -77,20 +76,13 @@ def _opened(path: Path) -> Iterator[Workbook]:
         import openpyxl
     except ImportError as error:
         raise InputError("a workbook needs openpyxl: pip install 'driftwalk[excel]'") from error
-    with damaged_as("as an Excel workbook", path):
+    with damaged_as("as an Excel workbook", path), warnings.catch_warnings():
+        # What the library remarks on styles and rules has no part in the numbers.
+        warnings.simplefilter("ignore")
         refuse_huge_zip(path)
-        with _unremarked():
-            book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
         with closing(book):
             yield book
-
-
-@contextmanager
-def _unremarked() -> Iterator[None]:
-    """Leave out what the library remarks on styles and rules, which have no part in the numbers."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
 
 
 Row = Sequence[Any]
@@ -102,18 +94,16 @@ def _rows(sheet: Any) -> Iterator[tuple[int, Row]]:
     The size that the sheet declares may be wrong.
     """
     sheet.reset_dimensions()
-    rows, blank = enumerate(sheet.iter_rows(values_only=True), start=1), 0
-    # A sheet has no more rows, so a row of a higher number is damage.
-    while blank < 1 << 20:
-        with _unremarked():
-            piece = list(islice(rows, 500))
-        if not piece:
+    blank = 0
+    for line, row in enumerate(sheet.iter_rows(values_only=True), start=1):
+        if any(cell is not None and cell != "" for cell in row):
+            blank = 0
+            yield line, row
+            continue
+        blank += 1
+        # A sheet has no more rows, so a row of a higher number is damage.
+        if blank >= 1 << 20:
             return
-        for line, row in piece:
-            filled = any(cell is not None and cell != "" for cell in row)
-            blank = 0 if filled else blank + 1
-            if filled:
-                yield line, row
 
 
 class SheetSource(MemorySource):
