@@ -43,8 +43,10 @@ class JsonPointsLoader:
         points = parse_json(bounded_text(path), path=path)
         if not isinstance(points, list) or not points:
             raise FormatError("expected a list with one point per frame")
-        rows = [_point(point, number) for number, point in enumerate(points, start=1)]
-        x, y, theta, t = (np.array(column) for column in zip(*rows, strict=True))
+        rows = np.empty((len(points), len(KEYS)))
+        for index, point in enumerate(points):
+            rows[index] = _point(point, index)
+        x, y, theta, t = (np.ascontiguousarray(rows[:, column]) for column in range(4))
         undetected = (x == -1.0) & (y == -1.0)
         x[undetected] = y[undetected] = np.nan
         timed = bool(np.isfinite(t).any())
@@ -65,7 +67,7 @@ def bounded_text(path: Path) -> bytes:
     return text
 
 
-def _point(point: Any, number: int) -> list[float]:
+def _point(point: Any, index: int) -> list[float]:
     """Return (x, y, theta, t) of one entry, NaN for what it does not have."""
     if point is None:
         return [np.nan] * 4
@@ -79,12 +81,12 @@ def _point(point: Any, number: int) -> list[float]:
         values, complete = [], False
     if not complete or not _numbers(values) or any(isinstance(one, bool) for one in values):
         raise FormatError(
-            f'entry {number} is {str(point)[:40]!r}, expected [x, y] or {{"x": .., "y": ..}}'
+            f'entry {index + 1} is {str(point)[:40]!r}, expected [x, y] or {{"x": .., "y": ..}}'
         )
     try:
         return [np.nan if value is None else float(value) for value in values]
     except OverflowError as error:
-        raise FormatError(f"entry {number} is too large for a number") from error
+        raise FormatError(f"entry {index + 1} is too large for a number") from error
 
 
 class JsonLinesLoader:
