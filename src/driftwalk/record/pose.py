@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,111 @@ def angle_between(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array
     angle: Array = np.arctan2(dy, dx)
     angle[(dx == 0.0) & (dy == 0.0)] = np.nan
     return angle
+
+
+Places = Mapping[str, Mapping[str, Mapping[str, Any]]]
+"""Individual to keypoint to x, y and likelihood, where there is one, to where its values are."""
+Confidence = tuple[float, str]
+"""Least confidence of a keypoint in a format, and where that number comes from."""
+
+
+def choose_keypoints(places: Mapping[str, Iterable[str]], options: ReadOptions) -> list[str]:
+    """Return the keypoint that is the body, the named or the only one, and those of the heading.
+
+    Parameters
+    ----------
+    places : mapping
+        Individual to its keypoints.
+    options : ReadOptions
+        Its `keypoint` and `heading`.
+
+    Raises
+    ------
+    InputError
+        When several could be the body and none is named, or one that is named does not exist.
+    """
+    known = list(dict.fromkeys(name for own in places.values() for name in own))
+    position = options.keypoint
+    if position is None and len(known) == 1:
+        position = known[0]
+    if position not in known:
+        got = "" if position is None else f" (got '{position}')"
+        raise InputError(f"name the body's keypoint with `keypoint`{got}: {listed(known)}")
+    unknown = [name for name in options.heading or () if name not in known]
+    if unknown:
+        raise InputError(
+            f"`heading`: there is no keypoint '{unknown[0]}'; there are {listed(known)}"
+        )
+    return list(dict.fromkeys((position, *(options.heading or ()))))
+
+
+def recording_of_poses(
+    places: Places,
+    values: Callable[[Any], Array],
+    clock: Array,
+    options: ReadOptions,
+    usual: Confidence,
+) -> RawRecording:
+    """Return one body per individual that has the chosen keypoint, and what the user should know.
+
+    Parameters
+    ----------
+    places : mapping
+        Individual to keypoint to x, y and, where there is one, likelihood to its place in the file.
+    values : callable
+        Returns what is at a place as a new array, shape (n,).
+    clock : array, shape (n,)
+        Times or frame numbers of the rows.
+    options : ReadOptions
+        Its `keypoint`, `heading` and `min_confidence`.
+    usual : tuple of float and str
+        Least confidence where `min_confidence` is not given, and where that number comes from.
+
+    Raises
+    ------
+    InputError
+        When no keypoint is chosen, or a least confidence is asked for and the file holds none.
+    """
+    names = choose_keypoints(places, options)
+    stated = options.min_confidence is not None
+    least = usual[0] if options.min_confidence is None else options.min_confidence
+    bodies, notes = [], []
+    dropped, known, confident = 0, 0, False
+    for individual, own in places.items():
+        if names[0] not in own:
+            continue
+        points = {}
+        for name in names:
+            if name not in own:
+                continue
+            x, y = (values(own[name][axis]) for axis in "xy")
+            confidence = values(own[name]["likelihood"]) if "likelihood" in own[name] else None
+            seen = np.isfinite(x) & np.isfinite(y)
+            known += int(seen.sum())
+            if confidence is not None and np.isfinite(confidence).any():
+                confident = True
+                unsure = seen & (confidence < least)  # a confidence that is missing says nothing
+                x[unsure] = y[unsure] = np.nan
+                dropped += int(unsure.sum())
+            points[name] = (x, y)
+        theta = None
+        if options.heading is not None and set(options.heading) <= set(points):
+            theta = angle_between(*(points[name] for name in options.heading))
+        bodies.append(RawBody(individual, clock, *points[names[0]], theta))
+    without = [name for name, own in places.items() if names[0] not in own]
+    if without:
+        notes.append(f"without the keypoint, and left out: {listed(without)}")
+    if not confident:
+        if stated:
+            raise InputError("the file holds no confidences: leave `min_confidence` out")
+        notes.append("the file holds no confidences: every position counts as seen")
+    else:
+        source, change = ("", "") if stated else (f" ({usual[1]})", "; `min_confidence` changes it")
+        notes.append(
+            f"keypoints seen with a confidence below {least:g}{source} are missing: {dropped} of "
+            f"{known}{change}"
+        )
+    return RawRecording(bodies, length_unit="px", has_keypoints=True, notes=notes)
 
 
 def two_names(heading: Sequence[str] | None) -> tuple[str, str] | None:

@@ -12,27 +12,19 @@ bounding boxes have no keypoints. Where driftwalk wrote the file, positions stat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError, listed
+from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.clean import split_bodies
-from driftwalk.record.pose import angle_between
-from driftwalk.record.raw import (
-    LENGTH_UNITS,
-    Array,
-    Marks,
-    RawBody,
-    RawRecording,
-    ReadOptions,
-    TableLayout,
-)
+from driftwalk.record.pose import Confidence, Places, choose_keypoints, recording_of_poses
+from driftwalk.record.raw import LENGTH_UNITS, Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import Hdf5Contents, frame_in, names_in, opened_hdf5, text_of
 from driftwalk.record.tables.text_source import first_names, first_row
 from driftwalk.record.text import header_rows, read_table
@@ -41,83 +33,9 @@ from driftwalk.schema.stores.netcdf import HDF5, MAGIC, file_start, open_netcdf,
 if TYPE_CHECKING:
     import xarray as xr
 
-Places = Mapping[str, Mapping[str, Mapping[str, Any]]]
-"""Individual to keypoint to x, y and likelihood, where there is one, to where its values are."""
-Confidence = tuple[float, str]
-"""Least confidence of a keypoint in a format, and where that number comes from."""
 OF_DEEPLABCUT: Final = (0.6, "DeepLabCut's pcutoff")
 OF_SLEAP: Final = (0.2, "SLEAP's threshold of peaks")
 OF_MOVEMENT: Final = (0.6, "movement's threshold")
-
-
-def _chosen(places: Mapping[str, Iterable[str]], options: ReadOptions) -> list[str]:
-    """Return the keypoint that the user named as the body, or the only one; then the heading's."""
-    known = list(dict.fromkeys(name for own in places.values() for name in own))
-    position = options.keypoint
-    if position is None and len(known) == 1:
-        position = known[0]
-    if position not in known:
-        got = "" if position is None else f" (got '{position}')"
-        raise InputError(f"name the body's keypoint with `keypoint`{got}: {listed(known)}")
-    unknown = [name for name in options.heading or () if name not in known]
-    if unknown:
-        raise InputError(
-            f"`heading`: there is no keypoint '{unknown[0]}'; there are {listed(known)}"
-        )
-    return list(dict.fromkeys((position, *(options.heading or ()))))
-
-
-def _recording(
-    places: Places,
-    values: Callable[[Any], Array],
-    clock: Array,
-    options: ReadOptions,
-    usual: Confidence,
-) -> RawRecording:
-    """Return one body per individual that has the chosen keypoint, and what the user should know.
-
-    `values` returns what is at one of the places, as a new array of shape (n,).
-    """
-    names = _chosen(places, options)
-    stated = options.min_confidence is not None
-    least = usual[0] if options.min_confidence is None else options.min_confidence
-    bodies, notes = [], []
-    dropped, known, confident = 0, 0, False
-    for individual, own in places.items():
-        if names[0] not in own:
-            continue
-        points = {}
-        for name in names:
-            if name not in own:
-                continue
-            x, y = (values(own[name][axis]) for axis in "xy")
-            confidence = values(own[name]["likelihood"]) if "likelihood" in own[name] else None
-            seen = np.isfinite(x) & np.isfinite(y)
-            known += int(seen.sum())
-            if confidence is not None and np.isfinite(confidence).any():
-                confident = True
-                unsure = seen & (confidence < least)  # a confidence that is missing says nothing
-                x[unsure] = y[unsure] = np.nan
-                dropped += int(unsure.sum())
-            points[name] = (x, y)
-        theta = None
-        if options.heading is not None and set(options.heading) <= set(points):
-            theta = angle_between(*(points[name] for name in options.heading))
-        bodies.append(RawBody(individual, clock, *points[names[0]], theta))
-    without = [name for name, own in places.items() if names[0] not in own]
-    if without:
-        notes.append(f"without the keypoint, and left out: {listed(without)}")
-    if not confident:
-        if stated:
-            raise InputError("the file holds no confidences: leave `min_confidence` out")
-        notes.append("the file holds no confidences: every position counts as seen")
-    else:
-        source, change = ("", "") if stated else (f" ({usual[1]})", "; `min_confidence` changes it")
-        notes.append(
-            f"keypoints seen with a confidence below {least:g}{source} are missing: {dropped} of "
-            f"{known}{change}"
-        )
-    return RawRecording(bodies, length_unit="px", has_keypoints=True, notes=notes)
 
 
 def _places(
@@ -133,7 +51,7 @@ def _places(
 
 def _used(places: Places, options: ReadOptions) -> set[int]:
     """Return the columns of the chosen keypoints."""
-    names = _chosen(places, options)
+    names = choose_keypoints(places, options)
     used = (own.get(name, {}) for own in places.values() for name in names)
     return {at for place in used for at in place.values()}
 
@@ -166,7 +84,7 @@ def _of_arrays(
     def values(place: tuple[str, int, int]) -> Array:
         return np.array(arrays[place[0]].values[:, *place[1:]], dtype=np.float64)
 
-    return _recording(places, values, clock, options, usual)
+    return recording_of_poses(places, values, clock, options, usual)
 
 
 def _in_order(values: xr.DataArray, *order: str) -> xr.DataArray:
@@ -206,14 +124,14 @@ class DeepLabCutLoader:
                 if any(len(column) not in (3, 4) for column in levels):
                     raise FormatError(f"'{key}' has no columns of scorer, bodyparts, coords")
                 places, clock = _bodyparts(levels, 0), frame.labels()
-                return _recording(places, frame.numbers, clock, options, OF_DEEPLABCUT)
+                return recording_of_poses(places, frame.numbers, clock, options, OF_DEEPLABCUT)
         header = _header(path)
         columns = [*zip(*header, strict=True)]
         places = _bodyparts(columns[1:], 1)
         names = [".".join(filter(None, column)) for column in columns]
         wanted = (0, *sorted(_used(places, options)))
         numbers = read_table(path, TableLayout(",", names, len(header), wanted)).numbers
-        return _recording(places, numbers.__getitem__, numbers[0], options, OF_DEEPLABCUT)
+        return recording_of_poses(places, numbers.__getitem__, numbers[0], options, OF_DEEPLABCUT)
 
 
 def _header(path: Path) -> list[list[str]]:
@@ -329,7 +247,9 @@ class SleapCsvLoader:
         texts = () if track is None else (track,)
         table = read_table(path, TableLayout(",", names, 1, wanted, texts))
         numbers = table.numbers
-        raw = _recording({"0": nodes}, numbers.__getitem__, numbers[frame], options, OF_SLEAP)
+        raw = recording_of_poses(
+            {"0": nodes}, numbers.__getitem__, numbers[frame], options, OF_SLEAP
+        )
         if track is not None:
             (rows,) = raw.bodies
             raw.bodies = split_bodies(rows, table.codes[track], table.labels[track])

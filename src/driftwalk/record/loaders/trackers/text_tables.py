@@ -25,11 +25,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.cleaning.clean import (
-    codes_in_arenas,
-    number_codes,
-    split_bodies,
-)
+from driftwalk.record.cleaning.clean import codes_in_arenas, number_codes, split_bodies
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.loaders.json_formats import bounded_text, column_of
 from driftwalk.record.loaders.plain import HeadedFormat, described, side_by_side
