@@ -397,6 +397,9 @@ def table_in_memory(data: Any) -> MemorySource:
     """
     if hasattr(data, "data_vars"):
         raise InputError("this is a dataset: a recording is loaded of " + TAKEN)
+    what = "the mapping of columns"
+    if isinstance(data, np.ndarray) and data.dtype.names is not None:
+        what, data = "the structured array", {name: data[name] for name in data.dtype.names}
     if isinstance(data, np.ndarray):
         return _of_array(data)
     if hasattr(data, "iloc") and hasattr(data, "columns"):
@@ -407,10 +410,8 @@ def table_in_memory(data: Any) -> MemorySource:
         columns = [np.asarray(one.to_numpy()) for one in series]
         return _checked("the DataFrame", list(data.columns), columns, frozenset(zoned))
     if isinstance(data, Mapping):
-        columns = [
-            np.ma.asarray(one) if np.ma.isMA(one) else np.asarray(one) for one in data.values()
-        ]
-        return _checked("the mapping of columns", [str(name) for name in data], columns)
+        columns = [*map(np.asanyarray, data.values())]  # some may be masked
+        return _checked(what, [str(name) for name in data], columns)
     lazy = ": collect() it first" if hasattr(data, "collect_schema") else ""
     raise InputError(f"a recording is {TAKEN}; got {type(data).__name__}{lazy}")
 
@@ -431,11 +432,6 @@ def _checked(
 
 
 def _of_array(data: Values) -> MemorySource:
-    if data.dtype.names is not None:
-        if data.ndim != 1:
-            raise InputError(f"the structured array has {data.ndim} axes, and has to have one")
-        names = list(data.dtype.names)
-        return _checked("the structured array", names, [data[name] for name in names])
     if data.ndim != 2:
         raise InputError(
             "an array has a row per sample and a column per quantity, and this one has the shape "
