@@ -16,6 +16,7 @@ it varies. A target is named by its arena where there are several.
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -334,15 +335,18 @@ class KinoveaLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every track."""
         rows: list[list[str]] = []
-        track = ""
+        track, known = "", set[str]()
+        again: dict[str, int] = defaultdict(lambda: 1)
         for number, line in enumerate(bounded_text(path).decode("utf-8", "replace").split("\n"), 1):
             fields = line.split()
             if line.startswith("#"):  # several tracks may have one name
-                name, known = line.strip("# \r"), {row[3] for row in rows}
-                others = (f"{name} {at}" for at in range(2, len(known) + 3))
-                track = next(one for one in (name, *others) if one not in known)
+                name = line.strip("# \r")
+                # The first of a name has no number.
+                while (track := f"{name} {again[name]}".removesuffix(" 1")) in known:
+                    again[name] += 1
             elif len(fields) == 3:
                 rows.append([_HUNDREDTHS.sub(r"\1.\2", fields[0]), *fields[1:], track])
+                known.add(track)
             elif fields:
                 raise FormatError(f"expected T X Y, got {len(fields)} fields", line=number)
         columns = [column_of([*column]) for column in zip(*rows, strict=True)] or [np.zeros(0)] * 4
