@@ -25,16 +25,15 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     # `simulation`, with what it takes, for the probe: the same bits on every worker.
     "cluster": GROUND | {"sweep", "simulation", "model", "flow"},
     "simulation": GROUND | {"model"},
-    # `record` for the tracking noise of a recording, which is what "estimate" stands for.
+    # `record` for reading the recording of a study.
     "conditions": GROUND | {"record", "model", "flow", "simulation"},
     "motion": GROUND | {"conditions", "simulation", "comparison", "model"},
     "calibration": GROUND
     | {"conditions", "motion", "simulation", "comparison", "flow", "model", "sweep"},
     # `calibration` for the check of a fit: how far simulated steps are from the recording's.
-    # `record` for the noise of a track, which tells what its camera got wrong.
     "likelihood": GROUND
     | {"conditions", "motion", "simulation", "comparison", "flow", "model", "sweep"}
-    | {"calibration", "record"},
+    | {"calibration"},
     "assembly": GROUND | {"simulation", "comparison", "flow", "model", "sweep"},
     # `assemble` for the observer: what is seen is classified by the rules of simulated runs.
     "track": GROUND | {"record", "model", "assembly"},

@@ -171,3 +171,21 @@ def test_a_long_text_among_time_stamps_is_refused(tmp_path: Path) -> None:
 def test_a_whole_number_beyond_float64_is_a_gap(other: float | str) -> None:
     values = np.array([1, 10**400, -(10**400), other], dtype=object)
     assert as_numbers(values, "x").tolist() == [1.0, np.inf, -np.inf, float(other)]
+
+
+def test_a_name_with_a_long_run_of_blanks_is_read_at_once(tmp_path: Path) -> None:
+    path = table(tmp_path / "a.csv")
+    path.write_text(path.read_text().replace("theta_rad", f"a{' ' * 40_000}b"))
+    begin = time.process_time()
+    assert dw.load(path).sizes["time"] == 20
+    assert time.process_time() - begin < 2.0
+
+
+def test_many_names_of_tracks_are_read_at_once(tmp_path: Path) -> None:
+    rows = "".join(f"0:{k // 60:02}:{k % 60:02}:00 {k} 2\n" for k in range(3000))
+    text = "#Kinovea Trajectory data export\n#T X Y\n# Label\n" + rows + 30_000 * "# Label\n"
+    (tmp_path / "a.txt").write_text(text + "0:00:00:00 1 2\n0:00:01:00 3 4\n")
+    begin = time.process_time()
+    recording = dw.load(tmp_path / "a.txt", length_unit="mm")
+    assert time.process_time() - begin < 1.0
+    assert list(recording["body"].values) == ["Label", "Label 2"]

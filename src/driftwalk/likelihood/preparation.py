@@ -50,9 +50,9 @@ from driftwalk.likelihood.tracker_errors.dropped import (
 )
 from driftwalk.likelihood.tracker_errors.noise_free import AddedNoise, with_least_noise
 from driftwalk.likelihood.tracker_errors.smoothed import require_raw
-from driftwalk.record import without_outliers
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import fitted_value
+from driftwalk.schema.tracker_errors import without_outliers
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,8 +10,8 @@ from driftwalk.core.units import in_percent
 from driftwalk.likelihood.flow_intervals import Intervals
 from driftwalk.likelihood.law.search import LAW
 from driftwalk.likelihood.refuse import LENGTH, LIMIT, in_words, needed_duration
-from driftwalk.record import mistakes_warning
 from driftwalk.schema.answers.facts import is_open
+from driftwalk.schema.tracker_errors import mistakes_warning
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

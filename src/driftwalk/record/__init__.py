@@ -12,20 +12,19 @@ from driftwalk.record.cleaning.jumps import (
     impossible_steps,
     impossible_warning,
 )
-from driftwalk.record.cleaning.outliers import (
-    mistakes_warning,
-    without_far_outliers,
-    without_outliers,
-)
 from driftwalk.record.info import describe
-from driftwalk.record.io import load, readable_formats, save_trajectory
-from driftwalk.record.noise import (
+from driftwalk.record.io import load, readable_formats
+from driftwalk.schema.tracker_errors import (
     NoiseBound,
     NoiseEstimate,
     estimate_tracking_noise,
+    mistakes_warning,
     noise_bound,
     noise_reach,
+    without_far_outliers,
+    without_outliers,
 )
+from driftwalk.schema.trajectory import save_trajectory
 
 __all__ = [
     "CircleFit",

@@ -166,26 +166,45 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
     return PlacedArena(arena, (fit.center_x, fit.center_y), found, notes)
 
 
+def _placed(
+    arena: dict[str, Any],
+    size: float,
+    beyond: Callable[[float, float], Array],
+    fitted: Callable[[], tuple[tuple[float, float], dict[str, Any]]],
+    *,
+    center: tuple[float, float] | None,
+    reach: Reach,
+) -> PlacedArena:
+    """Return an arena whose centre is given, the file's origin, or fitted to the positions.
+
+    `beyond` returns how far each position is outside, given the centre.
+    """
+    found: dict[str, Any] = {"by": "given"}
+    at_origin = beyond(0.0, 0.0) <= 0.0
+    if center is None and at_origin.size and float(at_origin.mean()) >= _ARENA.inside:
+        center, found = (0.0, 0.0), {"by": "origin of the file"}
+    elif center is None:
+        center, found = fitted()
+    outside = beyond(*center)
+    found |= {"center_m": list(center), "samples_outside": int((outside > 0.0).sum())}
+    return PlacedArena(
+        {**arena, "center_m": [0.0, 0.0]}, center, found, _outside(outside, size, reach)
+    )
+
+
 def _circle(
     diameter: float, x: Array, y: Array, *, center: tuple[float, float] | None, reach: Reach
 ) -> PlacedArena:
-    found: dict[str, Any] = {"by": "given"}
-    radius = 0.5 * diameter
-    if center is None and _inside(np.hypot(x, y) <= radius):
-        center, found = (0.0, 0.0), {"by": "origin of the file"}
-    elif center is None:
+    def beyond(center_x: float, center_y: float) -> Array:
+        return np.hypot(x - center_x, y - center_y) - 0.5 * diameter
+
+    def fitted() -> tuple[tuple[float, float], dict[str, Any]]:
         fit = fit_circle(x, y)
-        center = (fit.center_x, fit.center_y)
-        found = {
-            "by": "fit",
-            "radius_of_centers_m": fit.radius,
-            "sectors_visited_share": fit.coverage,
-        }
-    found["center_m"] = list(center)
-    beyond = np.hypot(x - center[0], y - center[1]) - radius
-    arena = {"shape": "circle", "diameter_m": diameter, "center_m": [0.0, 0.0]}
-    found["samples_outside"] = int((beyond > 0.0).sum())
-    return PlacedArena(arena, center, found, _outside(beyond, diameter, reach))
+        known = {"radius_of_centers_m": fit.radius, "sectors_visited_share": fit.coverage}
+        return (fit.center_x, fit.center_y), {"by": "fit", **known}
+
+    arena = {"shape": "circle", "diameter_m": diameter}
+    return _placed(arena, diameter, beyond, fitted, center=center, reach=reach)
 
 
 def _rectangle(
@@ -197,24 +216,19 @@ def _rectangle(
     center: tuple[float, float] | None,
     reach: Reach,
 ) -> PlacedArena:
-    found: dict[str, Any] = {"by": "given"}
-    if center is None and _inside((np.abs(x) <= width / 2) & (np.abs(y) <= height / 2)):
-        center, found = (0.0, 0.0), {"by": "origin of the file"}
-    elif center is None:
+    def beyond(center_x: float, center_y: float) -> Array:
+        outside = np.abs(x - center_x) - width / 2, np.abs(y - center_y) - height / 2
+        return np.maximum(*outside)
+
+    def fitted() -> tuple[tuple[float, float], dict[str, Any]]:
         if not x.size:
             raise InputError("the arena's centre cannot be fitted: the recording has no positions")
         # The middle between the outermost positions, a few tracking errors aside.
         middle = [float(np.percentile(v, [0.05, 99.95]).mean()) for v in (x, y)]
-        center, found = (middle[0], middle[1]), {"by": "fit"}
-    found["center_m"] = list(center)
-    beyond = np.maximum(np.abs(x - center[0]) - width / 2, np.abs(y - center[1]) - height / 2)
-    arena = {"shape": "rectangle", "width_m": width, "height_m": height, "center_m": [0.0, 0.0]}
-    found["samples_outside"] = int((beyond > 0.0).sum())
-    return PlacedArena(arena, center, found, _outside(beyond, min(width, height), reach))
+        return (middle[0], middle[1]), {"by": "fit"}
 
-
-def _inside(inside: np.ndarray[Any, np.dtype[np.bool_]]) -> bool:
-    return bool(inside.size) and float(inside.mean()) >= _ARENA.inside
+    arena = {"shape": "rectangle", "width_m": width, "height_m": height}
+    return _placed(arena, min(width, height), beyond, fitted, center=center, reach=reach)
 
 
 def _outside(beyond: Array, size: float, reach: Reach) -> list[str]:
@@ -233,8 +247,8 @@ def _outside(beyond: Array, size: float, reach: Reach) -> list[str]:
 @naming_its_file
 def _polygon(path: Path) -> PlacedArena:
     from driftwalk.record.raw import TableLayout
+    from driftwalk.record.tables.text_source import read_header
     from driftwalk.record.text import read_table
-    from driftwalk.record.text_head import read_header
 
     names, delimiter, skip, has_header = read_header(path)
     if len(names) != 2 or (has_header and names != ["x_m", "y_m"]):

@@ -195,7 +195,8 @@ def unit_of_name(name: str) -> str:
 def split_brackets(name: str) -> tuple[str, str]:
     """Split ``"x (mm)"`` into the name and what stands in the brackets, in small letters."""
     name = name.strip().strip("\"'").strip().lstrip("#%").strip()
-    match = _BRACKETS.match(name)
+    # On a long run of blanks the search takes the square of its length.
+    match = _BRACKETS.match(name) if name.endswith((")", "]")) else None
     return (name, "") if match is None else (match.group(1), match.group(2).strip().lower())
 
 

@@ -11,9 +11,9 @@ from driftwalk.core.arrays import Bools
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text.json_text import json_value, parse_json
 from driftwalk.record.circle import fit_circle
-from driftwalk.record.noise import estimate_tracking_noise
 from driftwalk.record.raw import Array
 from driftwalk.schema import Track, body_names, body_track, check_trajectory
+from driftwalk.schema.tracker_errors import estimate_tracking_noise
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,11 +1,10 @@
-"""Load a recording: read, convert to SI, clean, place in its arena; write a trajectory."""
+"""Load a recording: read, convert to SI, clean, place in its arena."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError, listed
-from driftwalk.core.files.atomic import atomic_path, require_target, write_atomic
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.core.units import parse_quantity
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
@@ -21,7 +19,6 @@ from driftwalk.record.cleaning.clean import Counts, clean_body
 from driftwalk.record.cleaning.clock import check_clock, unwrap_counters
 from driftwalk.record.cleaning.jumps import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.record.cleaning.missing import blank_missing, mark_warnings
-from driftwalk.record.cleaning.outliers import without_far_outliers
 from driftwalk.record.cleaning.warn import (
     angle_warnings,
     plausibility_warnings,
@@ -29,13 +26,11 @@ from driftwalk.record.cleaning.warn import (
     refuse_sparse,
 )
 from driftwalk.record.convert_units import convert_units
-from driftwalk.record.noise import noise_reach
-from driftwalk.record.origin import origin_of
 from driftwalk.record.pose import join_markers, two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.registry import PLAIN
-from driftwalk.schema import Track, body_names, build_trajectory, check_trajectory
-from driftwalk.schema.stores.netcdf import netcdf_bytes
+from driftwalk.record.registry import PLAIN, origin_of
+from driftwalk.schema import Track, build_trajectory
+from driftwalk.schema.tracker_errors import noise_reach, without_far_outliers
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -207,20 +202,19 @@ def load(
         raw.notes += [*origin.notes(), *unwrap_counters(raw), *check_clock(raw)]
         raw.notes += [*angle_warnings(raw), *mark_warnings(raw, options.missing)]
         bodies, attrs = convert_units(raw, options, y_axis=y_axis, tank=tank)
-        clean = partial(
-            clean_body,
-            sort=sort,
-            start=start,
-            stop=stop,
-            max_speed=max_speed,
-            quantum=float(str(attrs["position_quantum_m"])),
-            separate=raw.separate,
-            columns=raw.body_columns,
-        )
         cleaned: list[RawBody] = []
         counts: dict[str, Counts] = {}
         while bodies:  # the uncleaned one is let go as soon as its successor is there
-            one, found = clean(bodies.pop(0))
+            one, found = clean_body(
+                bodies.pop(0),
+                sort=sort,
+                start=start,
+                stop=stop,
+                max_speed=max_speed,
+                quantum=float(str(attrs["position_quantum_m"])),
+                separate=raw.separate,
+                columns=raw.body_columns,
+            )
             cleaned.append(one)
             counts[one.name] = found
         if not any(body.clock.size for body in cleaned):
@@ -389,76 +383,3 @@ def _on_clock(time: Array, bodies: list[RawBody], values: Sequence[Array | None]
         if one is not None:
             columns[np.searchsorted(time, body.clock), index] = one
     return columns
-
-
-CSV_COLUMNS = ["t_s", "x_m", "y_m", "theta_rad", "body"]
-
-
-def save_trajectory(
-    dataset: xr.Dataset, path: str | PathLike[str], *, existing: str = "error"
-) -> Path:
-    """Write a trajectory as NetCDF (``.nc``) or plain CSV (``.csv``), by the name's ending.
-
-    CSV has the columns t_s, x_m, y_m, theta_rad and body. Numbers have as many digits as it takes
-    to read the same float64 back. Rows are the present samples, and one row with empty positions
-    for a time at which no body is present; the arena and the other attributes are lost, so NetCDF
-    is the format to keep.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A `trajectory`.
-    path : path-like
-        Where to write. The file appears whole or not at all.
-    existing : {"error", "replace"}
-        Behaviour if the file exists already.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        When the file exists, its folder does not, or its ending is neither ``.nc`` nor ``.csv``.
-    RunDirectoryError
-        When the place cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from driftwalk.schema import build_trajectory
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     save_trajectory(build_trajectory([0.0], [0.1], [0.2]), f"{folder}/a.csv").name
-    'a.csv'
-    """
-    check_trajectory(dataset)
-    target = Path(path)
-    require_target(target, existing=existing, endings=(".nc", ".csv"))
-    if target.suffix.lower() == ".csv":
-        with atomic_path(target) as partial:
-            _write_csv(dataset, partial)
-    else:
-        write_atomic(target, netcdf_bytes(dataset))
-    return target
-
-
-def _write_csv(dataset: xr.Dataset, path: Path) -> None:
-    """Write block by block, so that the text never stands in memory as a whole."""
-    import pandas as pd
-
-    time = dataset["time"].values
-    names = np.array(body_names(dataset), dtype=object)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        pd.DataFrame(columns=CSV_COLUMNS).to_csv(file, index=False)
-        for first in range(0, time.size, 200_000):
-            block = slice(first, first + 200_000)
-            x, y, theta = (dataset[name].values[block] for name in ("x", "y", "theta"))
-            present = np.isfinite(x) & np.isfinite(y)
-            present[:, 0] |= ~present.any(axis=1)
-            row, body = np.nonzero(present)
-            values = [time[block][row], x[row, body], y[row, body], theta[row, body], names[body]]
-            pd.DataFrame(dict(zip(CSV_COLUMNS, values, strict=True))).to_csv(
-                file, index=False, header=False
-            )

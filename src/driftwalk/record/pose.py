@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,41 +36,19 @@ def angle_between(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array
     return angle
 
 
-Point = tuple[Array, Array, "Array | None"]
-"""x, y and confidence of a keypoint, shape (n,) each; None: the file holds no confidence."""
+Places = Mapping[str, Mapping[str, Mapping[str, Any]]]
+"""Individual to keypoint to x, y and likelihood, where there is one, to where its values are."""
+Confidence = tuple[float, str]
+"""Least confidence of a keypoint in a format, and where that number comes from."""
 
 
-@dataclass(frozen=True)
-class Chosen:
-    """Keypoints that make the pose of a body."""
-
-    position: str
-    """Keypoint that is the body."""
-    heading: tuple[str, str] | None = None
-    """Keypoints from the first of which to the second the body points."""
-
-    def names(self) -> list[str]:
-        """Return the keypoints that have to be read."""
-        return list(dict.fromkeys((self.position, *(self.heading or ()))))
-
-
-@dataclass(frozen=True)
-class Confidence:
-    """Least confidence of a keypoint in a format, unless the user states another one."""
-
-    least: float
-    """Below it a position is missing."""
-    reason: str
-    """Where that number comes from."""
-
-
-def choose_keypoints(names: Sequence[str], options: ReadOptions) -> Chosen:
-    """Return the keypoints that the user named, or the only one.
+def choose_keypoints(places: Mapping[str, Iterable[str]], options: ReadOptions) -> list[str]:
+    """Return the keypoint that is the body, the named or the only one, and those of the heading.
 
     Parameters
     ----------
-    names : sequence of str
-        Keypoints of the file.
+    places : mapping
+        Individual to its keypoints.
     options : ReadOptions
         Its `keypoint` and `heading`.
 
@@ -80,7 +57,7 @@ def choose_keypoints(names: Sequence[str], options: ReadOptions) -> Chosen:
     InputError
         When several could be the body and none is named, or one that is named does not exist.
     """
-    known = list(dict.fromkeys(names))
+    known = list(dict.fromkeys(name for own in places.values() for name in own))
     position = options.keypoint
     if position is None and len(known) == 1:
         position = known[0]
@@ -92,16 +69,14 @@ def choose_keypoints(names: Sequence[str], options: ReadOptions) -> Chosen:
         raise InputError(
             f"`heading`: there is no keypoint '{unknown[0]}'; there are {listed(known)}"
         )
-    return Chosen(position, options.heading)
+    return list(dict.fromkeys((position, *(options.heading or ()))))
 
 
 def recording_of_poses(
-    places: Mapping[str, Mapping[str, Any]],
-    read: Callable[[Any], Point],
-    chosen: Chosen,
+    places: Places,
+    values: Callable[[Any], Array],
     clock: Array,
     options: ReadOptions,
-    *,
     usual: Confidence,
 ) -> RawRecording:
     """Return one body per individual that has the chosen keypoint, and what the user should know.
@@ -109,35 +84,35 @@ def recording_of_poses(
     Parameters
     ----------
     places : mapping
-        Individual to keypoint to its place in the file.
-    read : callable
-        Returns the keypoint at a place as new arrays.
-    chosen : Chosen
-        Which of them make the pose.
+        Individual to keypoint to x, y and, where there is one, likelihood to its place in the file.
+    values : callable
+        Returns what is at a place as a new array, shape (n,).
     clock : array, shape (n,)
         Times or frame numbers of the rows.
     options : ReadOptions
-        Its `min_confidence`.
-    usual : Confidence
-        Used where `min_confidence` is not given.
+        Its `keypoint`, `heading` and `min_confidence`.
+    usual : tuple of float and str
+        Least confidence where `min_confidence` is not given, and where that number comes from.
 
     Raises
     ------
     InputError
-        When a least confidence is asked for and the file holds no confidences.
+        When no keypoint is chosen, or a least confidence is asked for and the file holds none.
     """
+    names = choose_keypoints(places, options)
     stated = options.min_confidence is not None
-    least = usual.least if options.min_confidence is None else options.min_confidence
+    least = usual[0] if options.min_confidence is None else options.min_confidence
     bodies, notes = [], []
     dropped, known, confident = 0, 0, False
     for individual, own in places.items():
-        if chosen.position not in own:
+        if names[0] not in own:
             continue
         points = {}
-        for name in chosen.names():
+        for name in names:
             if name not in own:
                 continue
-            x, y, confidence = read(own[name])
+            x, y = (values(own[name][axis]) for axis in "xy")
+            confidence = values(own[name]["likelihood"]) if "likelihood" in own[name] else None
             seen = np.isfinite(x) & np.isfinite(y)
             known += int(seen.sum())
             if confidence is not None and np.isfinite(confidence).any():
@@ -147,10 +122,10 @@ def recording_of_poses(
                 dropped += int(unsure.sum())
             points[name] = (x, y)
         theta = None
-        if chosen.heading is not None and set(chosen.heading) <= set(points):
-            theta = angle_between(points[chosen.heading[0]], points[chosen.heading[1]])
-        bodies.append(RawBody(individual, clock, *points[chosen.position], theta))
-    without = [name for name in places if name not in {body.name for body in bodies}]
+        if options.heading is not None and set(options.heading) <= set(points):
+            theta = angle_between(*(points[name] for name in options.heading))
+        bodies.append(RawBody(individual, clock, *points[names[0]], theta))
+    without = [name for name, own in places.items() if names[0] not in own]
     if without:
         notes.append(f"without the keypoint, and left out: {listed(without)}")
     if not confident:
@@ -158,9 +133,7 @@ def recording_of_poses(
             raise InputError("the file holds no confidences: leave `min_confidence` out")
         notes.append("the file holds no confidences: every position counts as seen")
     else:
-        source, change = (
-            ("", "") if stated else (f" ({usual.reason})", "; `min_confidence` changes it")
-        )
+        source, change = ("", "") if stated else (f" ({usual[1]})", "; `min_confidence` changes it")
         notes.append(
             f"keypoints seen with a confidence below {least:g}{source} are missing: {dropped} of "
             f"{known}{change}"

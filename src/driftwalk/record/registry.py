@@ -1,30 +1,49 @@
-"""Registry of the readable formats, and recognition by the names that a file holds.
+"""Where a recording comes from: a table in memory, or a file that one of the loaders reads.
 
 Files under `record.loaders` are found automatically. A further format joins by one file that
 defines ``LOADER``, an object with the members of `Loader`, or by an entry in the ``LOADERS`` of a
-file of several. Nothing else has to be edited. Other packages name theirs by entry points, see
-`record.plugin_loaders`.
+file of several. Nothing else has to be edited. Other packages name theirs by entry points of the
+group ``driftwalk.loaders``: an error in one of them is one line with the name of its package, and
+keeps no other file from being read.
 """
 
 from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from importlib.metadata import EntryPoint, entry_points
+from os import PathLike
 from pathlib import Path
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
-from driftwalk.core.errors import FormatError, InputError
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError, naming_its_file, reason_of
+from driftwalk.core.files.bounded import text_of_name
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.plugin_loaders import ForeignLoaders, foreign_loaders
-from driftwalk.record.raw import Marks, RawRecording, ReadOptions
+from driftwalk.record.raw import (
+    ANGLE_UNITS,
+    CLOCK_UNITS,
+    LENGTH_UNITS,
+    Marks,
+    RawBody,
+    RawRecording,
+    ReadOptions,
+)
 from driftwalk.record.stores.hdf5 import names_in
 from driftwalk.record.stores.npz import NPY, ZIP, members
-from driftwalk.record.text import read_head
-from driftwalk.record.text_head import detect_delimiter, first_lines
-from driftwalk.schema.stores.netcdf import HDF5
+from driftwalk.record.tables.in_memory import table_in_memory
+from driftwalk.record.tables.rows import recording_of
+from driftwalk.record.tables.text_source import detect_delimiter, first_lines
+from driftwalk.record.text import encoding_notes, read_head
+from driftwalk.schema.stores.netcdf import HDF5, kind_of_file
+
+if TYPE_CHECKING:
+    pass
+
 
 OTHERS: Final = {
     b"CDF": "NetCDF 3",
@@ -209,12 +228,12 @@ def loaders() -> dict[str, Loader]:
     >>> "idtracker" in loaders()
     True
     """
-    return {**_own_loaders(), **_foreign().loaders}
+    return {**_own_loaders(), **_foreign()[0]}
 
 
 @cache
-def _foreign() -> ForeignLoaders:
-    """Return the loaders of other packages."""
+def _foreign() -> tuple[dict[str, ForeignLoader], dict[str, str]]:
+    """Return the loaders of other packages, and what is wrong with the broken ones."""
     return foreign_loaders(_own_loaders())
 
 
@@ -250,7 +269,7 @@ def find_loader(path: Path, *, format: str | None = None, by_columns: bool = Fal
         When there is no such format or file, or nothing recognises the content.
     """
     known = loaders()
-    broken = _foreign().broken
+    broken = _foreign()[1]
     if format is not None and format not in known:
         if format in broken:
             raise InputError(f"`format` '{format}': {broken[format]}")
@@ -273,3 +292,218 @@ def find_loader(path: Path, *, format: str | None = None, by_columns: bool = Fal
             f"the format is not recognised: {unknown_file(path, head, known)}{also}", path=path
         )
     return known[best]
+
+
+GROUP: Final = "driftwalk.loaders"
+_MEMBERS: Final = ("name", "description", "sniff", "read")
+
+
+class ForeignLoader:
+    """A loader of another package, whose errors name the package."""
+
+    def __init__(self, loader: Any, package: str) -> None:
+        self._loader = loader
+        self.name = str(loader.name)
+        self.description = str(loader.description)
+        self.package = package
+        self.failed = ""
+        """Error of the last attempt to recognise a file, ``""`` where there was none."""
+        self.marks: tuple[Marks, ...] = tuple(getattr(loader, "marks", ()))
+
+    def sniff(self, head: bytes, path: Path) -> float:
+        """Return how sure the loader is; one that fails is not sure at all."""
+        self.failed = ""
+        try:
+            return float(self._loader.sniff(head, path))
+        except Exception as error:  # whatever another package's code raises
+            kind = type(error).__name__
+            self.failed = (
+                f"the loader '{self.name}' of the package {self.package} failed to recognise it: "
+                f"{kind}: {reason_of(error)}"
+            )
+            return 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the file by the other package's code."""
+        by = f"the loader '{self.name}' of the package {self.package}"
+        try:
+            raw = self._loader.read(path, options)
+        except FormatError as error:
+            reason, at = f"{' '.join(error.reason.split())} ({by})", (error.line, error.column)
+            raise FormatError(reason, path=error.path, line=at[0], column=at[1]) from error
+        except InputError as error:
+            raise InputError(f"{reason_of(error)} ({by})") from error
+        except Exception as error:  # whatever another package's code raises
+            kind = type(error).__name__
+            raise FormatError(f"{by} failed: {kind}: {reason_of(error)}") from error
+        wrong = _what_is_wrong(raw)
+        if wrong:
+            raise FormatError(f"{by} returned {wrong}")
+        recording: RawRecording = raw
+        recording.bodies = [_own(body) for body in recording.bodies]
+        return recording
+
+
+def foreign_loaders(
+    taken: Container[str],
+) -> tuple[dict[str, ForeignLoader], dict[str, str]]:
+    """Return the loaders of the installed packages, and what is wrong with the broken ones.
+
+    Both by name: of the format, and of the entry point.
+
+    Parameters
+    ----------
+    taken : container of str
+        Names of formats that no other package may use.
+
+    Examples
+    --------
+    >>> foreign_loaders([])[1]
+    {}
+    """
+    found: dict[str, ForeignLoader] = {}
+    broken: dict[str, str] = {}
+    points = sorted(entry_points(group=GROUP), key=lambda point: (point.name, _package(point)))
+    for point in points:
+        try:
+            loader = point.load()
+            lacking = [name for name in _MEMBERS if not hasattr(loader, name)]
+            if lacking:
+                raise TypeError(f"it has no {' and no '.join(lacking)}")
+            foreign = ForeignLoader(loader, _package(point))
+        except Exception as error:  # whatever another package's code raises
+            reason = f"{type(error).__name__}: {reason_of(error)}"
+            broken[point.name] = f"the package {_package(point)} has a broken loader ({reason})"
+            continue
+        if foreign.name in taken or foreign.name in found:
+            broken[point.name] = (
+                f"the package {foreign.package} has a loader named '{foreign.name}', which another "
+                "loader is named already"
+            )
+        else:
+            found[foreign.name] = foreign
+    return found, broken
+
+
+def _package(point: EntryPoint) -> str:
+    return point.dist.name if point.dist is not None else point.value
+
+
+def _what_is_wrong(raw: Any) -> str:
+    """Return what a loader must not return, ``""`` where all is well."""
+    if not isinstance(raw, RawRecording):
+        return f"{type(raw).__name__}, and has to return a RawRecording"
+    units = (
+        ("clock_unit", raw.clock_unit, (*CLOCK_UNITS, "frame")),
+        ("length_unit", raw.length_unit, (*LENGTH_UNITS, "px", "")),
+        ("angle_unit", raw.angle_unit, tuple(ANGLE_UNITS)),
+        ("y_axis", raw.y_axis, ("up", "down", "")),
+    )
+    for name, value, known in units:
+        if value not in known:
+            return f"{name} = {value!r}, which is none of {', '.join(map(repr, known))}"
+    if not raw.bodies:
+        return "no bodies"
+    for body in raw.bodies:
+        columns = {name: np.asarray(getattr(body, name)) for name in ("clock", "x", "y")}
+        if body.theta is not None:
+            columns["theta"] = np.asarray(body.theta)
+        for name, values in columns.items():
+            if values.dtype.kind not in "fiu" or values.shape != columns["clock"].shape[:1]:
+                return (
+                    f"{name} of body '{body.name}' as {values.dtype} of shape {values.shape}, and "
+                    f"it has to be numbers, one for each of the {columns['clock'].size} times"
+                )
+    return ""
+
+
+def _own(body: RawBody) -> RawBody:
+    """Return a body whose arrays may be converted in place."""
+    named = {"clock": body.clock, "x": body.x, "y": body.y, "theta": body.theta}
+    copied: dict[str, Any] = {
+        key: np.array(one, dtype=np.float64) for key, one in named.items() if one is not None
+    }
+    return replace(body, name=str(body.name), **copied)
+
+
+IN_MEMORY: Final = "table"
+"""Format of what is no file."""
+_OF_FILES: Final = ("delimiter", "header_line", "sheet", "topic", "x", "y", "theta", "keypoint")
+"""Options that say something about a file alone."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A recording that is still to be read."""
+
+    where: str
+    """The file, or what the table is, for messages."""
+    name: str
+    """Name of the source, for the dataset."""
+    format: str
+    read: Callable[[ReadOptions], RawRecording]
+    path: Path | None = None
+    guessed: bool = False
+    """Whether nothing but its content says that it is a plain table."""
+
+    def explained(self, error: InputError) -> InputError:
+        """Return an error of the reading with the file that it is about, and what may help."""
+        if self.path is None or not isinstance(error, FormatError):
+            return InputError(f"{self.where}: {' '.join(str(error).splitlines())}")
+        # A table that no loader recognised may be a damaged file of one of these formats.
+        hint = nearest_table(self.path, read_head(self.path), loaders()) if self.guessed else ""
+        path = error.path or self.path
+        return FormatError(error.reason + hint, path=path, line=error.line, column=error.column)
+
+    def notes(self) -> list[str]:
+        """Return what to say about the file apart from its contents."""
+        return [] if self.path is None else encoding_notes(self.path)
+
+
+def origin_of(
+    data: str | PathLike[str] | Any,
+    options: ReadOptions,
+    *,
+    format: str | None,
+    replicate: int | None,
+) -> Origin:
+    """Return where a recording comes from.
+
+    Parameters
+    ----------
+    data : path-like, or a table in memory
+        What `load` was given.
+    options : ReadOptions
+        What is known about it.
+    format : str, optional
+        Name of the format; None: recognised by content.
+    replicate : int, optional
+        Replicate of a simulation, if one was named.
+
+    Raises
+    ------
+    InputError
+        When it is nothing that can be read, or an option is about something else.
+    """
+    if not (isinstance(data, str) or hasattr(data, "__fspath__")):
+        table = table_in_memory(data)
+        stated = {name: getattr(options, name) for name in _OF_FILES}
+        stated |= {"format": format, "replicate": replicate}
+        given = [name for name, value in stated.items() if value is not None]
+        if given:
+            raise InputError(f"{table.what}: `{given[0]}` is about a file: leave it out")
+        name = table.what.removeprefix("the ")
+        return Origin(table.what, name, IN_MEMORY, partial(recording_of, table))
+    path = Path(data)
+    if replicate is not None and kind_of_file(path) != "simulation":
+        raise InputError(f"{path}: no simulation, so it has no replicates: omit `replicate`")
+    named = format or ("matrices" if options.y is not None else None)
+    loader = find_loader(path, format=named, by_columns=bool(options.columns))
+    return Origin(
+        where=str(path),
+        name=text_of_name(path.name),
+        format=loader.name,
+        read=partial(naming_its_file(loader.read), path),
+        path=path,
+        guessed=format is None and loader.name == PLAIN,
+    )

@@ -207,27 +207,6 @@ class _BoundedGzip(gzip.GzipFile):
         return count
 
 
-def lines_of(file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
-    """Yield the lines of a text file that hold anything, with their numbers from 1.
-
-    Raises
-    ------
-    FormatError
-        When one is longer than any line of a text file.
-    """
-    number, rest = 1, b""
-    while block := file.read(TEXT.block_bytes):
-        if not rest and not block.strip():
-            number += block.count(b"\n")
-            continue
-        *lines, rest = (rest + block).split(b"\n")
-        refuse_long_line(rest, number + len(lines))
-        yield from ((at, line) for at, line in enumerate(lines, start=number) if line)
-        number += len(lines)
-    if rest:
-        yield number, rest
-
-
 def refuse_long_line(line: bytes, number: int) -> None:
     """Refuse a line that is longer than any line of a text file."""
     if len(line) > TEXT.longest_line:
@@ -295,7 +274,7 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
             f"expected at least {needed} columns, got {len(layout.names)}: is it another format?",
         )
     collected = _Collected(layout)
-    for line, block in islice(_blocks(path, layout.skip_lines), blocks):
+    for line, block in islice(blocks_of(path, layout.skip_lines), blocks):
         # pandas fails on a table of blank lines alone.
         if block.strip(b" \r\n"):
             collected.add(block, line)
@@ -419,7 +398,7 @@ def far_origin(values: npt.NDArray[Any]) -> int:
     return int(values[0])
 
 
-def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
+def blocks_of(path: Path, skip_lines: int = 0) -> Iterator[tuple[int, bytes]]:
     """Yield (number of the first line, whole lines) until the file ends."""
     line = 1 + skip_lines
     with open_binary(path) as file:

@@ -28,8 +28,8 @@ import numpy.typing as npt
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.memoize import remembered
 from driftwalk.likelihood.filter.series import ORIENTED_SHARE
-from driftwalk.record import estimate_tracking_noise
 from driftwalk.schema import Track
+from driftwalk.schema.tracker_errors import estimate_tracking_noise
 
 WIDTH: Final = 8
 """Samples of a window, four on either side of the interval in question."""

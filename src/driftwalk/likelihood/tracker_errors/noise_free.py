@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.record import estimate_tracking_noise
 from driftwalk.schema import Track
+from driftwalk.schema.tracker_errors import estimate_tracking_noise
 
 
 class LeastNoisePolicy(NamedTuple):

@@ -1,21 +1,34 @@
-"""Arrays: ``.npy`` with a row per sample, ``.npz`` and HDF5 by name, Parquet and Feather."""
+"""Arrays: NumPy, HDF5 by name, Parquet and Feather, and MATLAB files with tracks of other programs.
+
+``.npy`` has a row per sample; MATLAB files hold structs, vectors, matrices. Ctrax and JAABA: an
+array of structs, one a body, each with its first frame. FlyTracker: one array over body, frame and
+field, with the names of the fields. Robotarium: five rows for each robot.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import InputError, damaged_as
+from driftwalk.core.errors import FormatError, InputError, damaged_as, listed
 from driftwalk.record.column_names import column_meaning
-from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
 from driftwalk.record.stores.npz import NPY, ZIP, members, opened_npz
 from driftwalk.record.tables.in_memory import table_in_memory
-from driftwalk.record.tables.matlab import Struct, Value, matlab_tables
+from driftwalk.record.tables.matlab import (
+    Value,
+    elements_of,
+    matlab_tables,
+    matlab_variables_of,
+    only_matlab,
+)
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.record.vocabulary import ALLOWED
+from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, matlab_variables
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 _RATES: Final = ("fps", "frame_rate", "framerate", "frame_rate_hz", "frames_per_second")
@@ -96,7 +109,7 @@ def _of_arrays(variables: dict[str, Value], options: ReadOptions) -> RawRecordin
 def _value(array: np.ndarray[Any, Any]) -> Value:
     """Return an array in the form of a MATLAB variable: with two axes."""
     if array.dtype.names is not None:
-        return Struct([{name: _value(array[name]) for name in array.dtype.names}])
+        return [{name: _value(array[name]) for name in array.dtype.names}]
     if array.dtype.kind in "SU":
         return [one.decode() if isinstance(one, bytes) else str(one) for one in array.ravel()]
     if array.dtype.kind == "M":
@@ -111,15 +124,12 @@ def _of_hdf5(contents: Hdf5Contents) -> dict[str, Value]:
     found: dict[str, Value] = {}
     for name, entry in contents.file.items():
         if hasattr(entry, "keys"):
-            inner = [one for one in entry if hasattr(entry[one], "shape")]
-            found[str(name)] = Struct(
-                [
-                    {
-                        _with_unit(str(one), entry[one]): _value(contents.array(f"{name}/{one}"))
-                        for one in inner
-                    }
-                ]
-            )
+            inner = {str(one): entry[one] for one in entry if hasattr(entry[one], "shape")}
+            fields = {
+                _with_unit(one, array): _value(contents.array(f"{name}/{one}"))
+                for one, array in inner.items()
+            }
+            found[str(name)] = [fields]
         elif hasattr(entry, "shape"):
             found[_with_unit(str(name), entry)] = _value(contents.array(str(name)))
     found |= {
@@ -168,4 +178,167 @@ class ArrowLoader:
         return recording_of(table_in_memory(frame), options)
 
 
-LOADERS = (ArraysLoader(), ArrowLoader())
+class MatlabLoader:
+    """Fields and variables are named as the columns of a plain table."""
+
+    name = "matlab"
+    description = "MATLAB .mat, versions 5 and 7.3 (struct or vectors t, x, y; `sheet` names one)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the first words."""
+        return 0.5 if head.startswith((OLD, HDF5_BASED)) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the variable that holds positions."""
+        with matlab_variables_of(path) as variables:
+            tables = matlab_tables(variables)
+            unread = only_matlab(variables)
+            if not tables:
+                has = listed(list(variables)) or "nothing"
+                reason = unread or f"has no struct, vectors or matrix of numbers, only {has}"
+                raise FormatError(reason)
+            try:
+                return recording_of(the_one_that_fits(tables, options, "variable"), options)
+            except FormatError as error:
+                also = f"; {unread}" if unread else ""
+                raise FormatError(f"{error.reason}{also}") from error
+
+
+ROBOT_ROWS: Final = 5
+"""x, y, theta, speed and turn rate of a robot."""
+
+
+class MatlabTracksLoader:
+    """One body for each struct, row of an array or robot."""
+
+    name = "matlab-tracks"
+    description = "MATLAB tracks of Ctrax and JAABA (trx), FlyTracker (trk), Robotarium"
+
+    def sniff(self, head: bytes, path: Path) -> float:
+        """Recognise the name of the variable."""
+        known = head.startswith((OLD, HDF5_BASED)) and set(_READERS) & set(matlab_variables(path))
+        try:
+            return 0.9 if known and _tracks(path) is not None else 0.0
+        except FormatError:
+            return 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every body."""
+        del options
+        recording = _tracks(path)
+        if recording is None or not recording.bodies:
+            raise FormatError(
+                f"has no tracks: it needs one of {', '.join(_READERS)} in the layout of its program"
+            )
+        return recording
+
+
+def _tracks(path: Path) -> RawRecording | None:
+    """Return the tracks of a file, None where no variable has the layout of its program."""
+    with matlab_variables_of(path) as variables:
+        name = next((one for one in _READERS if one in variables), None)
+        return None if name is None else _READERS[name](variables[name])
+
+
+def _ctrax(value: Value) -> RawRecording | None:
+    """Return the bodies of Ctrax: millimetres where it knows them, y as in the image."""
+    elements = elements_of(value)
+    if not elements or not {"x", "y", "firstframe"} <= set(elements[0]):
+        return None
+    scaled = {"x_mm", "y_mm"} <= set(elements[0])
+    stamped = all(
+        "timestamps" in one and _values(one["timestamps"]).size == _values(one["x"]).size > 0
+        for one in elements
+    )
+    bodies = []
+    for at, one in enumerate(elements, start=1):
+        x, y = (_values(one[f"{axis}_mm" if scaled else axis]) for axis in "xy")
+        theta = _values(one["theta"]) if "theta" in one else None
+        first = _one_number(one["firstframe"], 1.0)
+        frames = np.arange(x.size, dtype=np.float64) + (first - 1.0)
+        clock = _values(one["timestamps"]) if stamped else frames
+        name = _one_number(one.get("id"), float(at))
+        bodies.append(RawBody(f"{name:g}", clock, x, y, theta))
+    rate = _one_number(elements[0].get("fps"), 0.0)
+    return RawRecording(
+        bodies,
+        clock_unit="s" if stamped else "frame",
+        length_unit="mm" if scaled else "px",
+        y_axis="down",
+        frame_rate_hz=rate if rate > 0.0 and not stamped else None,
+        separate=True,
+    )
+
+
+def _flytracker(value: Value) -> RawRecording | None:
+    """Return the bodies of FlyTracker: pixels, y down, but angles with y up."""
+    fields = next(iter(elements_of(value)), {})
+    names, data = fields.get("names"), fields.get("data")
+    if not isinstance(names, list) or not isinstance(data, np.ndarray) or data.ndim not in (2, 3):
+        return None
+    # Of one body MATLAB keeps the first axis, and of one field drops the last.
+    stack = data.reshape(data.shape[0], -1, len(names)) if data.ndim == 2 else data
+    if stack.shape[2] != len(names) or not {"pos x", "pos y"} <= set(map(str, names)):
+        return None
+    at = {str(name): index for index, name in enumerate(names)}
+    clock = np.arange(stack.shape[1], dtype=np.float64)
+    of_x, of_y, of_angle = (at.get(name) for name in ("pos x", "pos y", "ori"))
+    bodies = [
+        RawBody(
+            str(number),
+            clock,
+            _values(track[:, of_x]),
+            _values(track[:, of_y]),
+            None if of_angle is None else _values(track[:, of_angle]),
+        )
+        for number, track in enumerate(stack, start=1)
+    ]
+    return RawRecording(bodies, length_unit="px", y_axis="down", theta_axis="up", separate=True)
+
+
+def _robotarium(value: Value) -> RawRecording | None:
+    """Return the robots of the Robotarium: metres, y up, a column for each step of 33 ms."""
+    if not isinstance(value, np.ndarray) or value.ndim != 2 or value.dtype.kind not in "fiu":
+        return None
+    stamped = value.shape[0] % ROBOT_ROWS == 1 and value.shape[0] > 1
+    count = value.shape[0] // ROBOT_ROWS
+    if not count or value.shape[0] % ROBOT_ROWS > 1:
+        return None
+    clock = np.arange(value.shape[1], dtype=np.float64)
+    robots = [[_values(value[ROBOT_ROWS * at + row]) for row in range(3)] for at in range(count)]
+    notes = ["every column counts as a frame; the Robotarium steps each 33 ms unless it is late"]
+    if stamped:
+        notes.append("the time stamps in the last row have no unit and are not read")
+    return RawRecording(
+        [RawBody(str(at), clock, *of) for at, of in enumerate(robots, start=1)],
+        length_unit="m",
+        y_axis="up",
+        notes=notes,
+        separate=True,
+    )
+
+
+_READERS: Final[dict[str, Callable[[Value], RawRecording | None]]] = {
+    "trx": _ctrax,
+    "trk": _flytracker,
+    "robotarium_data": _robotarium,
+}
+"""From the name of a variable to what makes a recording of it."""
+
+
+def _values(value: Any) -> Array:
+    return np.array(value, dtype=np.float64).ravel()
+
+
+def _one_number(value: Any, otherwise: float) -> float:
+    """Return the one number of a field."""
+    known = isinstance(value, np.ndarray) and value.size == 1 and value.dtype.kind in "fiu"
+    return float(value.ravel()[0]) if known else otherwise
+
+
+LOADERS = (
+    ArraysLoader(),
+    ArrowLoader(),
+    MatlabLoader(),
+    MatlabTracksLoader(),
+)

@@ -13,9 +13,14 @@ import numpy as np
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.tables.rows import recording_of
-from driftwalk.record.tables.text_source import TextSource
+from driftwalk.record.tables.text_source import (
+    TextSource,
+    first_lines,
+    first_names,
+    first_row,
+    read_header,
+)
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_lines, first_names, first_row, read_header
 
 
 class PlainLoader:

@@ -1,17 +1,23 @@
-"""HDF5 files that are no NetCDF: what is in them, and arrays no larger than the file can hold."""
+"""HDF5 files that are no NetCDF: what is in them, and arrays no larger than the file can hold.
+
+Tables that pandas stored are read without PyTables. The fixed format keeps blocks of columns of one
+type each, the table format one compound array. The names of the columns are arrays in the first,
+and pickled lists in attributes in the second.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, damaged_as
 from driftwalk.record.raw import Array
+from driftwalk.record.stores.plain_pickle import unpickle
 from driftwalk.schema.stores.hdf5_texts import refuse_endless_texts
 from driftwalk.schema.stores.netcdf import HDF5, declared_bytes, refuse_elsewhere, refuse_huge
 
@@ -51,19 +57,6 @@ class Hdf5Contents:
         self._declared += declared_bytes(entry)
         refuse_huge(self._declared, self.path)
         return np.asarray(entry[()])
-
-    def numbers(self, name: str) -> Array:
-        """Return the values of an array of numbers as float64, which nobody else holds.
-
-        Raises
-        ------
-        FormatError
-            As `array`, and when it holds no numbers.
-        """
-        values = self.array(name)
-        if values.dtype.kind not in "fiub":
-            raise FormatError(f"'{name}' holds no numbers")
-        return np.array(values, dtype=np.float64)
 
     def texts(self, name: str) -> list[str]:
         """Return the values of a one-dimensional array of texts.
@@ -127,3 +120,127 @@ def names_in(path: Path, head: bytes) -> set[str]:
             return set(map(str, file)) | set(map(str, file.attrs))
     except Exception:  # whatever the damage of a file leads the library to
         return set()
+
+
+Column = tuple[str, ...]
+_SAVE_ELSE = "save the table as CSV (DataFrame.to_csv) and give that"
+
+
+class Frame(NamedTuple):
+    """A table that pandas stored in an HDF5 file."""
+
+    key: str
+    columns: dict[Column, npt.NDArray[Any] | None]
+    """From the name of each column, by level, to its numbers; None where it holds none."""
+    rows: npt.NDArray[Any] | None
+
+    def numbers(self, column: int) -> Array:
+        """Return a column as float64.
+
+        Raises
+        ------
+        FormatError
+            When it holds no numbers.
+        """
+        name = [*self.columns][column]
+        values = self.columns[name]
+        if values is None:
+            raise FormatError(f"column '{'.'.join(name)}' of '{self.key}' holds no numbers")
+        return np.array(values, dtype=np.float64)
+
+    def labels(self) -> Array:
+        """Return the labels of the rows; they are numbered where they are no numbers."""
+        rows = np.arange(self.numbers(0).size) if self.rows is None else self.rows
+        return np.array(rows, dtype=np.float64)
+
+
+def frame_in(contents: Hdf5Contents, key: str) -> Frame:
+    """Return the table that lies under a key.
+
+    Parameters
+    ----------
+    contents : Hdf5Contents
+        The file.
+    key : str
+        Name of the group.
+
+    Raises
+    ------
+    FormatError
+        When there is no table that is understood.
+    """
+    import h5py
+
+    group = contents.file.get(key)
+    if not isinstance(group, h5py.Group):
+        raise FormatError(f"has no table '{key}'")
+    kind = text_of(group.attrs.get("pandas_type", b""))
+    if kind == "frame_table" and isinstance(group.get("table"), h5py.Dataset):
+        frame = _table(contents, key, group)
+    elif kind == "frame":
+        frame = _fixed(contents, key, group)
+    else:
+        raise FormatError(
+            f"'{key}' is no table of pandas that can be read (it says '{kind}'): {_SAVE_ELSE}"
+        )
+    if not frame.columns:
+        raise FormatError(f"the table '{key}' has no columns")
+    return frame
+
+
+def _fixed(contents: Hdf5Contents, key: str, group: Any) -> Frame:
+    """Return a table of the fixed format: blocks of columns of one type each."""
+    columns: dict[Column, npt.NDArray[Any] | None] = {}
+    for block in range(int(group.attrs.get("nblocks", 0))):
+        names = _labels(contents, key, f"block{block}_items", group)
+        columns |= _columns(names, contents.array(f"{key}/block{block}_values"))
+    numbered = "axis1" in group and group["axis1"].dtype.kind in "iuf"
+    return Frame(key, columns, contents.array(f"{key}/axis1") if numbered else None)
+
+
+def _columns(
+    names: list[Column], values: npt.NDArray[Any]
+) -> dict[Column, npt.NDArray[Any] | None]:
+    """Return the columns of a block, shape (row, column)."""
+    count = values.shape[1] if values.ndim == 2 and values.dtype.kind in "fiub" else 0
+    return {name: values[:, at] if at < count else None for at, name in enumerate(names)}
+
+
+def _labels(contents: Hdf5Contents, key: str, name: str, group: Any) -> list[Column]:
+    """Return the names of the columns of a block, of one level or of several."""
+    if text_of(group.attrs.get(f"{name}_variety", b"regular")) != "multi":
+        return [(text,) for text in contents.texts(f"{key}/{name}")]
+    levels = range(int(group.attrs.get(f"{name}_nlevels", 0)))
+    texts = [contents.texts(f"{key}/{name}_level{level}") for level in levels]
+    codes = [contents.array(f"{key}/{name}_label{level}").tolist() for level in levels]
+    if any(
+        not 0 <= code < len(of) for of, column in zip(texts, codes, strict=True) for code in column
+    ):
+        raise FormatError(f"the names of the columns of '{key}' are damaged")
+    return [
+        tuple(texts[level][code] for level, code in enumerate(row))
+        for row in zip(*codes, strict=True)
+    ]
+
+
+def _table(contents: Hdf5Contents, key: str, group: Any) -> Frame:
+    """Return a table of the table format: one compound array."""
+    stored = contents.array(f"{key}/table")
+    fields = stored.dtype.names or ()
+    columns: dict[Column, npt.NDArray[Any] | None] = {}
+    for name in fields:
+        if name != "index":
+            values = stored[name]
+            values = values.reshape(len(values), -1) if len(values) else values[:, None]
+            columns |= _columns(_pickled(group, f"{name}_kind"), values)
+    numbered = "index" in fields and stored["index"].dtype.kind in "iuf"
+    return Frame(key, columns, stored["index"] if numbered else None)
+
+
+def _pickled(group: Any, attribute: str) -> list[Column]:
+    """Return the names of columns that pandas pickled into an attribute of the table."""
+    stored = group["table"].attrs.get(attribute, b"")
+    names = unpickle(bytes(stored), where=f"attribute '{attribute}'")
+    if not isinstance(names, list):
+        raise FormatError(f"the attribute '{attribute}' names no columns")
+    return [tuple(map(str, name)) if isinstance(name, tuple) else (str(name),) for name in names]

@@ -11,13 +11,13 @@ import numpy as np
 
 from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import InputError, argument_text, listed
-from driftwalk.record.cleaning.several_bodies import rows_of_bodies
+from driftwalk.record.cleaning.clean import rows_of_bodies
 from driftwalk.record.column_names import ColumnMeaning, split_brackets, words_of
 from driftwalk.record.raw import Array, ReadOptions, TableLayout
 from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS, words
 
 if TYPE_CHECKING:
-    from driftwalk.record.tables.source import TableSource
+    from driftwalk.record.tables.in_memory import TableSource
 
 FORMS: Final = ("xyxy", "xywh", "cxcywh", "none")
 _STATED: Final = re.compile(

@@ -11,6 +11,7 @@ from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
 from driftwalk.record.raw import LENGTH_UNITS, MISSING, ReadOptions
 from driftwalk.record.tables.boxes import find_box
+from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.tables.named_columns import (
     ColumnReading,
     NamedColumns,
@@ -18,7 +19,6 @@ from driftwalk.record.tables.named_columns import (
     may_be_unit,
     shown,
 )
-from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import OF_DAY
 from driftwalk.record.vocabulary import ALLOWED, FRONT, LENGTHS, MIDDLE, REAR
 

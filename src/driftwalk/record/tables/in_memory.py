@@ -1,4 +1,4 @@
-"""Columns in memory as a table, their values as numbers, names or time stamps.
+"""Tables: their interface to the reader, and columns in memory with numbers, names or time stamps.
 
 Data frames, arrays, a mapping of columns.
 """
@@ -10,7 +10,7 @@ import datetime
 import math
 import numbers
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,6 @@ from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.raw import MISSING, Array, TableLayout
-from driftwalk.record.tables.source import TABLE
 from driftwalk.record.tables.stamps import (
     MOMENT,
     OF_DAY,
@@ -32,6 +31,55 @@ from driftwalk.record.tables.stamps import (
     stamp_form,
 )
 from driftwalk.record.text import Table, far_origin
+
+
+class TablePolicy(NamedTuple):
+    """How much of a table is looked at before it is read."""
+
+    heading_rows: int = 100
+    """Rows among which are the names of the columns and the first row of data; chosen by hand."""
+    sample_rows: int = 50
+    """Rows by which a table is recognised; chosen by hand."""
+    first_rows: int = 100_000
+    """Rows that are read where only the first ones are needed; chosen by hand."""
+
+
+TABLE: Final = TablePolicy()
+
+
+class TableSource(Protocol):
+    """A table with one row per sample."""
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the columns, ``""`` where there is none."""
+
+    @property
+    def units(self) -> list[str]:
+        """Units in a row below the names; empty where there is no such row."""
+
+    @property
+    def has_header(self) -> bool:
+        """Whether the columns have names."""
+
+    def sample(self) -> list[list[str]]:
+        """Return the first rows as texts."""
+
+    def stamps(self, column: int, /) -> StampForm | None:
+        """Return how the first time stamp of a column is written, None where it has none."""
+
+    def read(self, wanted: TableLayout, /, *, head: bool = False) -> Table:
+        """Read the columns that a layout names; of the `head` no more than the first rows.
+
+        Raises
+        ------
+        FormatError
+            When a row or a field cannot be read.
+        """
+
+    def error(self, message: str, /) -> FormatError:
+        """Return an error about the header, or the table where it has none."""
+
 
 Values = npt.NDArray[Any]
 
@@ -285,53 +333,47 @@ class MemorySource:
     def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
         """Read columns."""
         if not self.rows:
-            raise FormatError("holds no rows of data")
+            raise self.error("holds no rows of data")
         taken = slice(TABLE.first_rows if head else None)
         used = {*wanted.numbers, *wanted.texts, *wanted.stamps}
+        columns = {at: self._columns[at][taken] for at in used}
         try:
-            return table_of({at: self._columns[at][taken] for at in used}, wanted, self._zoned)
+            return self._table(columns, wanted)
         except (CellError, StampError) as error:
-            raise FormatError(f"{error} (row {error.row}, counted from 0)") from error
+            raise self.error_in_row(str(error), error.row) from error
+
+    def _table(self, columns: Mapping[int, Values], wanted: TableLayout) -> Table:
+        """Return the numbers, names and times of columns."""
+        origin, calendar, numbers = 0, "", {}
+        if wanted.clock is not None:
+            origin = far_origin(np.asarray(columns[wanted.clock]))
+        for at in wanted.numbers:
+            values = columns[at] - origin if origin and at == wanted.clock else columns[at]
+            numbers[at] = as_numbers(values, wanted.names[at])
+        names = {at: as_names(columns[at]) for at in wanted.texts}
+        if wanted.stamps:
+            readers = {at: StampReader() for at in wanted.stamps}
+            ticks = [as_ticks(columns[at], reader) for at, reader in readers.items()]
+            for at, reader in readers.items():
+                reader.zoned |= at in self._zoned
+            numbers[wanted.stamps[0]], first = clock_of_stamps(ticks, None)
+            origin, calendar = first or 0, calendar_of([*readers.values()])
+        return Table(
+            rows=next(iter(columns.values())).size,
+            numbers=numbers,
+            codes={at: codes for at, (codes, _) in names.items()},
+            labels={at: found for at, (_, found) in names.items()},
+            clock_origin=origin,
+            calendar=calendar,
+        )
+
+    def error_in_row(self, message: str, row: int) -> FormatError:
+        """Return an error about a row, from 0."""
+        return FormatError(f"{message} (row {row}, counted from 0)")
 
     def error(self, message: str) -> FormatError:
         """Return an error about the table."""
         return FormatError(message)
-
-
-def table_of(
-    columns: Mapping[int, Values], wanted: TableLayout, zoned: frozenset[int] = frozenset()
-) -> Table:
-    """Return the numbers, names and times of columns.
-
-    Raises
-    ------
-    CellError, StampError
-        At the first value that is not of the kind that its column has to be of.
-    """
-    origin, numbers = 0, {}
-    if wanted.clock is not None:
-        origin = far_origin(np.asarray(columns[wanted.clock]))
-    for at in wanted.numbers:
-        values = columns[at] - origin if origin and at == wanted.clock else columns[at]
-        numbers[at] = as_numbers(values, wanted.names[at])
-    names = {at: as_names(columns[at]) for at in wanted.texts}
-    calendar = ""
-    if wanted.stamps:
-        readers = [StampReader() for _ in wanted.stamps]
-        pairs = zip(wanted.stamps, readers, strict=True)
-        ticks = [as_ticks(columns[at], reader) for at, reader in pairs]
-        for at, reader in zip(wanted.stamps, readers, strict=True):
-            reader.zoned |= at in zoned
-        numbers[wanted.stamps[0]], first = clock_of_stamps(ticks, None)
-        origin, calendar = first or 0, calendar_of(readers)
-    return Table(
-        rows=next(iter(columns.values())).size,
-        numbers=numbers,
-        codes={at: codes for at, (codes, _) in names.items()},
-        labels={at: found for at, (_, found) in names.items()},
-        clock_origin=origin,
-        calendar=calendar,
-    )
 
 
 def table_in_memory(data: Any) -> MemorySource:
@@ -355,6 +397,9 @@ def table_in_memory(data: Any) -> MemorySource:
     """
     if hasattr(data, "data_vars"):
         raise InputError("this is a dataset: a recording is loaded of " + TAKEN)
+    what = "the mapping of columns"
+    if isinstance(data, np.ndarray) and data.dtype.names is not None:
+        what, data = "the structured array", {name: data[name] for name in data.dtype.names}
     if isinstance(data, np.ndarray):
         return _of_array(data)
     if hasattr(data, "iloc") and hasattr(data, "columns"):
@@ -365,10 +410,8 @@ def table_in_memory(data: Any) -> MemorySource:
         columns = [np.asarray(one.to_numpy()) for one in series]
         return _checked("the DataFrame", list(data.columns), columns, frozenset(zoned))
     if isinstance(data, Mapping):
-        columns = [
-            np.ma.asarray(one) if np.ma.isMA(one) else np.asarray(one) for one in data.values()
-        ]
-        return _checked("the mapping of columns", [str(name) for name in data], columns)
+        columns = [*map(np.asanyarray, data.values())]  # some may be masked
+        return _checked(what, [str(name) for name in data], columns)
     lazy = ": collect() it first" if hasattr(data, "collect_schema") else ""
     raise InputError(f"a recording is {TAKEN}; got {type(data).__name__}{lazy}")
 
@@ -389,11 +432,6 @@ def _checked(
 
 
 def _of_array(data: Values) -> MemorySource:
-    if data.dtype.names is not None:
-        if data.ndim != 1:
-            raise InputError(f"the structured array has {data.ndim} axes, and has to have one")
-        names = list(data.dtype.names)
-        return _checked("the structured array", names, [data[name] for name in names])
     if data.ndim != 2:
         raise InputError(
             "an array has a row per sample and a column per quantity, and this one has the shape "

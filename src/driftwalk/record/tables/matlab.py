@@ -26,14 +26,6 @@ _CLASS: Final = "MATLAB_class"
 
 
 @dataclass(frozen=True)
-class Struct:
-    """A struct, or an array of structs."""
-
-    elements: list[dict[str, Value]]
-    """The fields of each element."""
-
-
-@dataclass(frozen=True)
 class Opaque:
     """An object that only MATLAB can read."""
 
@@ -41,8 +33,15 @@ class Opaque:
     """Its class: table, timetable, datetime, string, ..."""
 
 
-Value = npt.NDArray[Any] | str | list[Any] | Struct | Opaque | None
-"""An array of numbers with two axes or more, a text, a cell array as a list, or none of these."""
+Value = npt.NDArray[Any] | str | list[Any] | Opaque | None
+"""An array of numbers with two axes or more, a text, a list, or none of these: a cell array is a
+list, and a struct one of the fields of each of its elements."""
+
+
+def elements_of(value: Value) -> list[dict[str, Value]]:
+    """Return the elements of a struct, [] of any other value."""
+    struct = isinstance(value, list) and all(isinstance(one, dict) for one in value)
+    return value if isinstance(value, list) and struct else []
 
 
 @contextmanager
@@ -87,9 +86,7 @@ def _old_value(value: Any) -> Value:
     if value.dtype.names is not None:
         refuse_many(value.size)
         fields = value.dtype.names
-        return Struct(
-            [{name: _old_value(one[name]) for name in fields} for one in value.ravel(order="F")]
-        )
+        return [{name: _old_value(one[name]) for name in fields} for one in value.ravel(order="F")]
     if value.dtype.kind == "O":
         refuse_many(value.size)
         return [_old_value(one) for one in value.ravel(order="F")]
@@ -129,7 +126,7 @@ def _texts(rows: list[str]) -> Value:
     return texts if len(texts) > 1 else "".join(texts)
 
 
-def _hdf5_struct(contents: Hdf5Contents, group: Any) -> Struct:
+def _hdf5_struct(contents: Hdf5Contents, group: Any) -> Value:
     """Return a struct; of an array of them each field holds references to the elements' values."""
     import h5py
 
@@ -145,15 +142,13 @@ def _hdf5_struct(contents: Hdf5Contents, group: Any) -> Struct:
             one[field] = _hdf5_value(contents, str(entry.name))
     lengths = {len(names) for names in many.values()}
     if not many:
-        return Struct([one])
+        return [one]
     if len(lengths) > 1:
         raise FormatError(f"'{group.name}' has fields of different lengths")
-    return Struct(
-        [
-            {field: _hdf5_value(contents, names[at]) for field, names in many.items()}
-            for at in range(lengths.pop())
-        ]
-    )
+    return [
+        {field: _hdf5_value(contents, names[at]) for field, names in many.items()}
+        for at in range(lengths.pop())
+    ]
 
 
 def _referred(contents: Hdf5Contents, entry: Any) -> list[str]:
@@ -212,8 +207,7 @@ def only_matlab(variables: dict[str, Value]) -> str:
     inner = {
         f"{name}.{field}": one
         for name, value in variables.items()
-        if isinstance(value, Struct) and value.elements
-        for field, one in value.elements[0].items()
+        for field, one in next(iter(elements_of(value)), {}).items()
     }
     everything = [*variables.items(), *inner.items()]
     found = [(name, value.kind) for name, value in everything if isinstance(value, Opaque)]
@@ -232,10 +226,9 @@ def only_matlab(variables: dict[str, Value]) -> str:
 
 def _table(value: Value, what: str) -> MemorySource | None:
     """Return a variable that holds a table by itself, None of any other."""
-    if isinstance(value, Struct):
-        if len(value.elements) == 1:
-            return _of_fields(value.elements[0], what)
-        return _of_elements(value.elements, what)
+    if elements := elements_of(value):
+        single = len(elements) == 1
+        return _of_fields(elements[0], what) if single else _of_elements(elements, what)
     if isinstance(value, np.ndarray) and value.ndim == 2 and min(value.shape) > 1:
         # There are more samples than quantities, whichever way they lie.
         rows = value if value.shape[0] >= value.shape[1] else value.T
@@ -278,7 +271,7 @@ def _row_count(fields: dict[str, Value]) -> int | None:
         name: max(value.shape) if isinstance(value, np.ndarray) else len(value)
         for name, value in fields.items()
         if (isinstance(value, np.ndarray) and value.ndim == 2 and value.size)
-        or isinstance(value, list)
+        or (isinstance(value, list) and not elements_of(value))
     }
     meanings = {name: column_meaning(name) for name in lengths}
     of_x = [lengths[name] for name, known in meanings.items() if known and known.quantity == "x"]
@@ -307,8 +300,6 @@ def _columns(value: Value, rows: int) -> list[Values]:
 
 def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
     """Return an array of structs as a table: a row each, or the rows of a body each."""
-    if not elements:
-        return None
     if all(_is_single(value) for element in elements for value in element.values()):
         names = list(elements[0])
         columns = [objects([_single(one.get(name)) for one in elements]) for name in names]

@@ -10,7 +10,7 @@ from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import ColumnMeaning, column_meaning, unit_of_name
 from driftwalk.record.raw import ReadOptions
 from driftwalk.record.tables.boxes import Box
-from driftwalk.record.tables.source import TableSource
+from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.vocabulary import (
     ALLOWED,
     FRONT,

@@ -13,11 +13,11 @@ import numpy as np
 from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import argument_text
 from driftwalk.record.bad_row import is_number
-from driftwalk.record.cleaning.several_bodies import LARGEST_SHARE, order_in_frame
+from driftwalk.record.cleaning.clean import LARGEST_SHARE, order_in_frame
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import MISSING, Array, TableLayout
+from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.tables.named_columns import LEFT_OUT, TableReading
-from driftwalk.record.tables.source import TableSource
 from driftwalk.record.text import Table
 from driftwalk.record.vocabulary import ALLOWED, UNITS
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError, InputError, argument_text, listed
-from driftwalk.record.cleaning.several_bodies import order_in_body, split_bodies
+from driftwalk.record.cleaning.clean import order_in_body, split_bodies
 from driftwalk.record.convert_units import scale_wanted
 from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import (
@@ -26,9 +26,9 @@ from driftwalk.record.raw import (
 from driftwalk.record.space import Plane, body_in_plane, on_the_ground, plane_of_columns
 from driftwalk.record.tables.boxes import box_angle, box_centre
 from driftwalk.record.tables.columns import read_columns
+from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.tables.named_columns import TableReading
 from driftwalk.record.tables.row_order import body_columns, other_order
-from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import DAY, count_days
 from driftwalk.record.text import Table
 from driftwalk.record.vocabulary import words

@@ -1,20 +1,295 @@
-"""A table in a text file: its delimiter, the names of its columns, and the units below them."""
+"""A table in a text file: its delimiter, the row that names its columns, and the units below it.
+
+The header may stand below titles.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import re
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
-from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import split_fields
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError, naming_its_file
+from driftwalk.record.bad_row import decoded_line, is_number, split_fields
+from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
-from driftwalk.record.tables.heading import header_advice, heading_of, is_data, units_below
-from driftwalk.record.tables.source import TABLE
+from driftwalk.record.tables.columns import read_columns
+from driftwalk.record.tables.in_memory import TABLE, MemorySource
 from driftwalk.record.tables.stamps import StampForm, stamp_form
-from driftwalk.record.text import Table, header_rows, read_table
-from driftwalk.record.text_head import detect_delimiter, read_header
+from driftwalk.record.text import Table, header_rows, read_head, read_table
+from driftwalk.record.vocabulary import NO_UNIT, UNITS
+
+_COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
+_DELIMITER_LINE = re.compile(r"sep=(.)\s*", re.IGNORECASE)
+"""First line that states the delimiter to a spreadsheet."""
+_CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
+"""Bytes that no text file holds."""
+
+
+def first_lines(head: bytes, count: int = 5) -> list[str]:
+    """Return the first whole lines of a file's start; bytes that are not UTF-8 are replaced.
+
+    Nothing is returned when the bytes cannot be text.
+    """
+    if not _is_text(head):
+        return []
+    lines = head.split(b"\n", count)
+    return [line.decode("utf-8", "replace").rstrip("\r") for line in lines[:count] if line.strip()]
+
+
+@lru_cache(maxsize=1)
+def _is_text(head: bytes) -> bool:
+    # One loader after the other asks of the same head.
+    return _CONTROL.search(head) is None
+
+
+def first_line(head: bytes) -> str:
+    """Return the first line of a file's start, ``""`` when it is blank or cannot be text."""
+    return next(iter(first_lines(head, 1)), "")
+
+
+def first_names(head: bytes) -> list[str]:
+    """Return the fields between the commas of the first line of a file's start."""
+    return split_fields(first_line(head), ",")
+
+
+def detect_delimiter(lines: list[str]) -> str:
+    """Return the character that separates the fields of the first lines; a blank when none does.
+
+    A tab or semicolon wins over a comma, since a comma may also be a decimal sign; blanks come
+    last, since they stand in names, but before a comma that is the decimal sign of every field.
+    """
+    fields = [field for line in lines[:2] for field in line.split()]
+    if len(fields) > len(lines[:2]) and all(_COMMA_DECIMAL.fullmatch(field) for field in fields):
+        return " "
+    for delimiter in "\t;,":
+        if lines and all(delimiter in line for line in lines[:2]):
+            return delimiter
+    return next((delimiter for delimiter in "\t;," if lines and delimiter in lines[0]), " ")
+
+
+def is_numeric_row(fields: list[str]) -> bool:
+    """Whether a row is data: each field is a number, a time or missing, and one at least is not."""
+    known = [field for field in fields if field not in MISSING]
+    return bool(known) and all(
+        is_number(field) or is_number(field, decimal=",") or stamp_form(field) is not None
+        for field in known
+    )
+
+
+@naming_its_file
+def read_header(
+    path: Path, *, delimiter: str | None = None, header_line: int | None = None
+) -> tuple[list[str], str, int, bool]:
+    """Return (names of the columns, delimiter, lines before the data, whether there is a header).
+
+    The header is line `header_line`, from 1, where that is given. Otherwise lines that start with
+    ``#`` before it are comments; a header may start with ``#`` or ``%`` itself when it is the last
+    of them and has as many fields as the data.
+
+    Raises
+    ------
+    FormatError
+        When the file is empty, ends before its header, or its first lines are not UTF-8 text.
+    """
+    if header_line is not None:
+        return _header_at(path, header_line, delimiter)
+    head = read_head(path)
+    if b"\0" in head:
+        raise FormatError("is not a text file")
+    raw = head.split(b"\n")
+    stated = _DELIMITER_LINE.fullmatch(raw[0].decode("utf-8", "replace"))
+    begin = 1 if stated else 0
+    at = next(
+        (
+            number
+            for number, line in enumerate(raw)
+            if number >= begin and line.strip() and not line.startswith(b"#")
+        ),
+        None,
+    )
+    if at is None:
+        raise FormatError("the file is empty")
+    lines = [decoded_line(line, number) for number, line in enumerate(raw[: at + 2], start=1)]
+    separator = delimiter or (stated[1] if stated else detect_delimiter(lines[at : at + 2]))
+    fields = _without_trailing(split_fields(lines[at], separator))
+    if not is_numeric_row(fields):
+        return fields, separator, at + 1, True
+    previous = [line for line in lines[begin:at] if line.strip()]
+    if previous:
+        commented = _without_trailing(split_fields(previous[-1].lstrip("# "), separator))
+        if len(commented) == len(fields) > 1:
+            return commented, separator, at, True
+    return [""] * len(fields), separator, at, False
+
+
+def first_row(path: Path, delimiter: str = ",") -> list[str]:
+    """Return the fields of the first line of a table, however long, [] where there is none.
+
+    Raises
+    ------
+    FormatError
+        When it is no text.
+    """
+    return split_fields(next(iter(header_rows(path, 1)), ""), delimiter)
+
+
+def _without_trailing(fields: list[str]) -> list[str]:
+    """Drop one empty field that a delimiter at the end of a line leaves."""
+    return fields[:-1] if len(fields) > 1 and not fields[-1] else fields
+
+
+def _header_at(path: Path, number: int, delimiter: str | None) -> tuple[list[str], str, int, bool]:
+    """Return what `read_header` does, with the header in a line that the user names."""
+    lines = header_rows(path, number + 1)
+    if len(lines) <= number or not lines[number].strip():
+        raise FormatError(f"has no rows of data below line {number}, its header")
+    separator = delimiter or detect_delimiter(lines[number - 1 :])
+    names, data = (split_fields(line.lstrip("# "), separator) for line in lines[number - 1 :])
+    # A delimiter at the end of a line leaves a field without a name, in the header or in the data.
+    names += [""] * (len(data) - len(names))
+    return (_without_trailing(names) if len(data) < len(names) else names), separator, number, True
+
+
+class Heading(NamedTuple):
+    """The names of the columns, their units, and how many rows they are in."""
+
+    names: list[str]
+    units: list[str]
+    rows: int
+
+
+def heading_of(rows: Sequence[list[str]], options: ReadOptions) -> Heading | None:
+    """Return the names that the first of some rows has, with the units of the second, if any.
+
+    Parameters
+    ----------
+    rows : sequence of list of str
+        Three rows that follow each other.
+    options : ReadOptions
+        What is known about the table.
+
+    Returns
+    -------
+    Heading or None
+        None unless they name positions, and the row below holds them.
+
+    Examples
+    --------
+    >>> rows = [["t", "x", "y"], ["[ms]", "[cm]", "[cm]"], ["0", "1.5", "2"]]
+    >>> heading_of(rows, ReadOptions())
+    Heading(names=['t', 'x', 'y'], units=['ms', 'cm', 'cm'], rows=2)
+    """
+    if rows and rows[0][:1] == ["coords"]:
+        # The lowest level of DeepLabCut's header: those above it name the body parts.
+        return None
+    if len(rows) > 1 and _holds_positions(rows[0], [], rows[1], options):
+        return Heading(rows[0], [], 1)
+    if len(rows) > 2 and (units := units_below(rows[0], rows[1], options)):
+        names = rows[0][: len(units)]
+        if _holds_positions(names, units, rows[2], options):
+            return Heading(names, units, 2)
+    return None
+
+
+def units_below(names: list[str], row: list[str], options: ReadOptions) -> list[str]:
+    """Return what a row of units says of each column, [] where it is none.
+
+    Columns that are not read may have any unit, such as cm/s.
+    """
+    fields = [field.strip("[]() ") for field in row[: len(names)]]
+    fields += [""] * (len(names) - len(fields))
+    chosen = set(options.columns.values())
+    known = 0
+    for name, field in zip(names, fields, strict=True):
+        if not field or field in MISSING:
+            continue
+        if field.lower() in UNITS or field.lower() in NO_UNIT:
+            known += 1
+        elif (
+            is_number(field)
+            or name in chosen
+            or ((meaning := column_meaning(name)) is not None and meaning.quantity != "body")
+        ):
+            return []
+    return ["" if field in MISSING else field for field in fields] if known else []
+
+
+def is_data(first: list[str], below: Sequence[list[str]], options: ReadOptions) -> bool:
+    """Whether a first row that holds a text is data, and no header.
+
+    Parameters
+    ----------
+    first : list of str
+        Its fields.
+    below : sequence of list of str
+        The rows below it.
+    options : ReadOptions
+        Columns that are named by their numbers are to hold numbers.
+    """
+    second = below[0] if below else []
+    numeric = [
+        _is_numeric(field) and at < len(second) and _is_numeric(second[at])
+        for at, field in enumerate(first)
+    ]
+    if not any(numeric) or len(second) != len(first):
+        return False
+    references = [one.rpartition(":")[0] or one for one in options.columns.values()]
+    if options.columns:
+        return not any(one in first and not one.isdecimal() for one in references)
+    known = [meaning.quantity for name in first if (meaning := column_meaning(name)) is not None]
+    return not {"x", "y"} <= set(known)
+
+
+def _is_numeric(field: str) -> bool:
+    return field not in MISSING and (is_number(field) or is_number(field, decimal=","))
+
+
+def header_advice(rows: Sequence[list[str]], first: int) -> str:
+    """Return what to say where no row was found to name the columns; empty where the first may.
+
+    Parameters
+    ----------
+    rows : sequence of list of str
+        The first rows.
+    first : int
+        Line of the first of them, from 1.
+    """
+    data = next((at for at, row in enumerate(rows) if is_numeric_row(row)), None)
+    if data is None or data < 2:
+        return ""
+    return (
+        f"; line {first + data} is the first of numbers: if line {first + data - 1} names the "
+        f"columns, add `header_line={first + data - 1}`"
+    )
+
+
+def _holds_positions(
+    names: list[str], units: list[str], below: list[str], options: ReadOptions
+) -> bool:
+    """Whether some names are those of positions, and a row holds a position below them."""
+    try:
+        source = MemorySource("the names", names, [np.zeros(0)] * len(names), units=units)
+        reading = read_columns(source, options, lenient=True)
+    except InputError:
+        return False
+    columns = [
+        at
+        for places in reading.bodies.values()
+        for quantity, at in places.items()
+        if quantity != "theta"
+    ]
+    if any(_is_numeric(names[at]) for at in columns):
+        return False  # a row of data
+    cells = [below[at] if at < len(below) else "" for at in columns]
+    numeric = all(cell in MISSING or _is_numeric(cell) for cell in cells)
+    return numeric and any(below)  # a body that is not seen yet has a row without a position
 
 
 class TextSource:
@@ -46,19 +321,17 @@ class TextSource:
             if len(below) > 1 and (units := units_below(self.names, below[0], options)):
                 self.units, self._skip = units, begin + 2
             return
-        for at, line in enumerate(lines):
-            if not line.strip():
-                continue
+        filled = [at for at, line in enumerate(lines) if line.strip()]
+        for number, at in enumerate(filled):
             here = self._delimiter if not at else None
             delimiter = options.delimiter or here or detect_delimiter(lines[at : at + 2])
-            below_at = [n for n in range(at + 1, len(lines)) if lines[n].strip()][:2]
-            texts = [line.lstrip("# ").removeprefix("% "), *(lines[n] for n in below_at)]
-            rows = [split_fields(one, delimiter) for one in texts]
-            found = heading_of(rows, options)
+            first, *others = (lines[one] for one in filled[number : number + 3])
+            texts = [first.lstrip("# ").removeprefix("% "), *others]
+            found = heading_of([split_fields(one, delimiter) for one in texts], options)
             if found is not None:
-                if at or found.rows > 1 or line.startswith("% "):
+                if at or found.rows > 1 or first.startswith("% "):
                     self.names, self.units, self._delimiter = found.names, found.units, delimiter
-                    self._skip = begin + [at, *below_at][found.rows - 1] + 1
+                    self._skip = begin + filled[number + found.rows - 1] + 1
                 # LabVIEW names a last column "Comment" and leaves it out.
                 if self.names[-1:] == ["Comment"] and len(self._rows[0]) == len(self.names) - 1:
                     self.names = self.names[:-1]

@@ -16,8 +16,8 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.raw import ANGLE_UNITS, LENGTH_UNITS, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space import MATRIX, QUATERNION, VECTOR, SpaceColumns, read_in_space
+from driftwalk.record.tables.text_source import first_lines
 from driftwalk.record.text import header_rows
-from driftwalk.record.text_head import first_lines
 from driftwalk.record.vocabulary import UNITS
 
 Rows = Sequence[Sequence[str]]

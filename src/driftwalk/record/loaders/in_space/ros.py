@@ -8,8 +8,9 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import accumulate
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -19,19 +20,10 @@ from driftwalk.core.text.json_text import MOST_LEVELS
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
 
-
-class Pose(NamedTuple):
-    """One body in one message."""
-
-    body: str
-    stamp: Any
-    """The stamp of its header, None where the message has none."""
-    parent: str
-    """Frame that the pose is in, ``""`` where the message does not say."""
-    values: tuple[float, ...]
-    """Position x, y, z [m] and quaternion x, y, z, w."""
-
-
+Pose = tuple[str, Any, str, tuple[float, ...]]
+"""One body in one message: its name, the stamp of its header, None where the message has none, the
+frame that the pose is in, ``""`` where the message does not say; position x, y, z [m] and
+quaternion x, y, z, w."""
 READ: Final = (
     *("geometry_msgs/msg/Pose", "geometry_msgs/msg/Pose2D", "geometry_msgs/msg/PoseStamped"),
     *("geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/msg/PoseArray"),
@@ -63,7 +55,7 @@ def _poses(message: Any, topic: str) -> Iterator[Pose]:
             moves = hasattr(one, "translation")
             at, turn = (one.translation, one.rotation) if moves else (one.position, one.orientation)
             values = (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
-        yield Pose(name, stamp, parent, values)
+        yield name, stamp, parent, values
 
 
 METADATA: Final = "metadata.yaml"
@@ -145,15 +137,13 @@ def _refuse_nested(path: Path) -> None:
     # A larger description would name more than a thousand files; its reader takes a second for
     # that.
     content = read_bounded(description, most=MIB // 4)
-    level = 0
-    for mark in re.findall(rb"[\[\]{}]", content):
-        level += 1 if mark in b"[{" else -1
-        if level > MOST_LEVELS:
-            raise FormatError(
-                f"holds values nested more than {MOST_LEVELS} levels deep, as no bag does: it is "
-                "damaged (ros2 bag reindex writes it again)",
-                path=description,
-            )
+    marks = re.findall(rb"[\[\]{}]", content)
+    if max(accumulate((1 if mark in b"[{" else -1 for mark in marks), initial=0)) > MOST_LEVELS:
+        raise FormatError(
+            f"holds values nested more than {MOST_LEVELS} levels deep, as no bag does: it is "
+            "damaged (ros2 bag reindex writes it again)",
+            path=description,
+        )
 
 
 def _choose(connections: list[Any], topic: str | None) -> list[Any]:
@@ -184,11 +174,11 @@ def _collect(reader: Any, chosen: list[Any]) -> tuple[_Tracks, set[str], int]:
     recorded = 0
     for connection, received, data in reader.messages(connections=chosen):
         message = reader.deserialize(data, connection.msgtype)
-        for pose in _poses(message, connection.topic.strip("/")):
-            stamp = 0 if pose.stamp is None else pose.stamp.sec * 1_000_000_000 + pose.stamp.nanosec
+        for body, stated, parent, values in _poses(message, connection.topic.strip("/")):
+            stamp = 0 if stated is None else stated.sec * 1_000_000_000 + stated.nanosec
             recorded += stamp == 0
-            tracks[connection.topic, pose.body].append((stamp or received, pose.values))
-            parents.add(pose.parent)
+            tracks[connection.topic, body].append((stamp or received, values))
+            parents.add(parent)
     return tracks, parents, recorded
 
 

@@ -18,8 +18,8 @@ from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.loaders.plain import described
 from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space import PARTS
+from driftwalk.record.tables.text_source import first_line, first_lines, first_row, is_numeric_row
 from driftwalk.record.text import header_rows
-from driftwalk.record.text_head import first_line, first_lines, first_row, is_numeric_row
 
 _START: Final = re.compile(r"#\s*timestamp\b[^,]*(,\s*p_\w*[xyz]\b[^,]*){3}")
 _PART: Final = re.compile(r"([pq])_(?:[A-Za-z]+_)*([wxyz])\s*(?:\[.*\])?")

@@ -7,27 +7,26 @@ without executing anything in it: see `record.stores.plain_pickle`.
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.core.files.bounded import MIB, read_bounded
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
+from driftwalk.record.cleaning.clean import number_codes, split_bodies
 from driftwalk.record.loaders.plain import side_by_side
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.npz import NPY
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
+from driftwalk.record.tables.text_source import first_line, first_row
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_line, first_row
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 _POSITION = re.compile(r"(?P<axis>[XY])(?P<body>\d+)")
@@ -67,15 +66,8 @@ KNOWN: Final = ("frames_per_second", "length_unit", "identities_labels")
 PROBABILITIES: Final = "id_probabilities"
 
 
-@dataclass
-class _Session:
-    """Contents of a file of idtracker.ai."""
-
-    trajectories: npt.NDArray[Any]
-    """Shape (frame, individual, 2)."""
-    probabilities: Callable[[], npt.NDArray[Any] | None]
-    """Returns the probabilities of the identities, shape (frame, individual) or one more."""
-    attributes: dict[str, Any]
+Probabilities = Callable[[], "npt.NDArray[Any] | None"]
+"""Returns the probabilities of the identities, shape (frame, individual) or one more."""
 
 
 class IdTrackerAiLoader:
@@ -108,37 +100,48 @@ class IdTrackerAiLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every individual; `min_confidence` asks for the probability of its identity."""
         if path.is_dir() or path.name == TABLE:
-            return _recording(_of_folder(path if path.is_dir() else path.parent), options)
+            return _of_folder(path if path.is_dir() else path.parent, options)
         start = file_start(path)
         if start == HDF5:
-            return _recording(_of_hdf5(path), options)
+            return _of_hdf5(path, options)
         if start.startswith((NPY, b"\x80")):
-            return _recording(_of_pickle(path), options)
+            return _of_pickle(path, options)
         return _of_tidy(path, options)
 
 
-def _recording(session: _Session, options: ReadOptions) -> RawRecording:
-    values = session.trajectories
+def _of_arrays(
+    values: npt.NDArray[Any],
+    probabilities: Probabilities,
+    attributes: dict[str, Any],
+    options: ReadOptions,
+) -> RawRecording:
+    """Return the recording of trajectories over frame, individual and (x, y)."""
     if values.ndim != 3 or values.shape[2] != 2 or values.dtype.kind not in "fiu":
         raise FormatError(
             f"'trajectories' has the shape {values.shape}, expected frames, individuals, 2"
         )
     frame = np.arange(len(values), dtype=np.float64)
-    names = _labels(session.attributes.get("identities_labels"), values.shape[1])
+    names = _labels(attributes.get("identities_labels"), values.shape[1])
     bodies = [
         RawBody(name, frame, *(np.array(values[:, at, axis], dtype=np.float64) for axis in (0, 1)))
         for at, name in enumerate(names)
     ]
-    notes = _unit_note(session.attributes)
+    return _recording(bodies, "frame", probabilities, attributes, options)
+
+
+def _recording(
+    bodies: list[RawBody],
+    clock_unit: str,
+    probabilities: Probabilities,
+    attributes: dict[str, Any],
+    options: ReadOptions,
+) -> RawRecording:
+    notes = _unit_note(attributes)
     if options.min_confidence is not None:
-        notes.append(_drop_unsure(bodies, session.probabilities(), options.min_confidence))
-    return RawRecording(
-        bodies,
-        length_unit="px",
-        frame_rate_hz=_rate(session.attributes),
-        has_confidence=True,
-        notes=notes,
-    )
+        notes.append(_drop_unsure(bodies, probabilities(), options.min_confidence))
+    rate = _rate(attributes)
+    facts: dict[str, Any] = {"frame_rate_hz": rate, "has_confidence": True, "notes": notes}
+    return RawRecording(bodies, clock_unit, "px", **facts)
 
 
 def _labels(stated: Any, count: int) -> list[str]:
@@ -181,10 +184,17 @@ def _drop_unsure(
     return f"positions with a probability of the identity below {least:g} are missing: {dropped}"
 
 
-def _of_pickle(path: Path) -> _Session:
+def _of_pickle(path: Path, options: ReadOptions) -> RawRecording:
     content = path.read_bytes()
     if content.startswith(NPY):
-        content = _behind_header(content)
+        header, _, content = content[len(NPY) :].partition(b"\n")
+        if b"'|O'" not in header:
+            with damaged_as("as .npy", path):
+                stored = np.load(path, allow_pickle=False)
+            raise FormatError(
+                f"is an array of {stored.dtype} of shape {stored.shape}, and no dictionary of "
+                "idtracker.ai: save columns of time, x and y as CSV"
+            )
     found = unpickle(content, where="the file")
     if isinstance(found, PickledArray) and len(found.objects()) == 1:
         found = found.objects()[0]
@@ -200,32 +210,10 @@ def _of_pickle(path: Path) -> _Session:
 
     trajectories = array("trajectories")
     assert trajectories is not None
-    return _Session(trajectories, lambda: array(PROBABILITIES), found)
+    return _of_arrays(trajectories, lambda: array(PROBABILITIES), found, options)
 
 
-def _behind_header(content: bytes) -> bytes:
-    """Return the pickle of an array of objects in NumPy's file."""
-    file = io.BytesIO(content)
-    try:
-        version = np.lib.format.read_magic(file)
-        read = (
-            np.lib.format.read_array_header_1_0
-            if version == (1, 0)
-            else np.lib.format.read_array_header_2_0
-        )
-        shape, _, kind = read(file)
-    except Exception as error:
-        # NumPy parses the header as Python, and fails with whatever damage leads it to.
-        raise FormatError(f"has a damaged header: {type(error).__name__}") from error
-    if kind.kind != "O":
-        raise FormatError(
-            f"is an array of {kind} of shape {shape}, and no dictionary of idtracker.ai: save "
-            "columns of time, x and y as CSV"
-        )
-    return content[file.tell() :]
-
-
-def _of_hdf5(path: Path) -> _Session:
+def _of_hdf5(path: Path, options: ReadOptions) -> RawRecording:
     with opened_hdf5(path) as contents:
         trajectories = contents.array("trajectories")
         attributes = {
@@ -234,10 +222,10 @@ def _of_hdf5(path: Path) -> _Session:
             if (value := contents.file.attrs.get(name)) is not None
         }
         known = contents.array(PROBABILITIES) if PROBABILITIES in contents.file else None
-    return _Session(trajectories, lambda: known, attributes)
+    return _of_arrays(trajectories, lambda: known, attributes, options)
 
 
-def _of_folder(folder: Path) -> _Session:
+def _of_folder(folder: Path, options: ReadOptions) -> RawRecording:
     attributes = _attributes(folder / ATTRIBUTES)
     path = folder / TABLE
     columns = _columns(path)
@@ -254,7 +242,7 @@ def _of_folder(folder: Path) -> _Session:
             return None
         return np.stack([one for name, one in _columns(file).items() if name != "time"], axis=1)
 
-    return _Session(trajectories, probabilities, attributes)
+    return _of_arrays(trajectories, probabilities, attributes, options)
 
 
 def _columns(path: Path) -> dict[str, Array]:
@@ -278,23 +266,14 @@ def _of_tidy(path: Path, options: ReadOptions) -> RawRecording:
     if not np.isfinite(individual).all():
         raise FormatError("a row names no individual")
     attributes = _attributes(path.with_name(TIDY_ATTRIBUTES))
-    rate = _rate(attributes)
-    by_frames = rate is not None or options.frame_rate_hz is not None
-    notes = _unit_note(attributes)
-    rows = RawBody("", frame if by_frames else time, x, y)
-    if options.min_confidence is not None:
-        notes.append(_drop_unsure([rows], known[:, None], options.min_confidence))
+    by_frames = _rate(attributes) is not None or options.frame_rate_hz is not None
+    rows, clock_unit = RawBody("", frame, x, y), "frame"
+    if not by_frames:
+        rows.clock, clock_unit = time, "s"
+    raw = _recording([rows], clock_unit, lambda: known[:, None], attributes, options)
     codes, _ = number_codes(individual)
-    count = int(codes.max()) + 1
-    labels = _labels(attributes.get("identities_labels"), count)
-    return RawRecording(
-        split_bodies(rows, codes, labels),
-        clock_unit="frame" if by_frames else "s",
-        length_unit="px",
-        frame_rate_hz=rate,
-        has_confidence=True,
-        notes=notes,
-    )
+    labels = _labels(attributes.get("identities_labels"), int(codes.max()) + 1)
+    return replace(raw, bodies=split_bodies(rows, codes, labels))
 
 
 LOADERS = (IdTrackerLoader(), IdTrackerAiLoader())

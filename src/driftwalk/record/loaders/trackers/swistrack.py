@@ -16,18 +16,19 @@ from __future__ import annotations
 
 import re
 from array import array
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import reduce
 from pathlib import Path
 
 import numpy as np
 
-from driftwalk.core.arrays import Integers
+from driftwalk.core.arrays import Codes, Integers
 from driftwalk.core.errors import FormatError, naming_its_file
-from driftwalk.record.cleaning.several_bodies import order_in_frame, split_bodies
+from driftwalk.record.cleaning.clean import order_in_frame, split_bodies
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.text import Table, lines_of, open_binary, read_head, read_table
-from driftwalk.record.text_head import first_line, first_lines
+from driftwalk.record.tables.text_source import first_line, first_lines
+from driftwalk.record.text import Table, blocks_of, read_head, read_table
 
 OLD = ["frame", "x (image)", "y (image)", "x (world)", "y (world)", "area", "orientation"]
 OLD = [*OLD, "compactness", "time stamp"]
@@ -92,6 +93,22 @@ def _recording(
     )
 
 
+def _of_particles(
+    rows: Array | Sequence[Array],
+    codes: Codes,
+    names: list[str],
+    clock_unit: str,
+    options: ReadOptions,
+    note: str,
+) -> RawRecording:
+    """Return bodies of rows of clock, image x, y, world x, y and orientation."""
+    clock, image_x, image_y, world_x, world_y, theta = rows
+    world = bool(world_x.any() or world_y.any()) and options.metres_per_pixel is None
+    x, y = (world_x, world_y) if world else (image_x, image_y)
+    bodies = split_bodies(RawBody("", clock, x, y, theta), codes, names)
+    return _recording(bodies, clock_unit, world=world, note=note)
+
+
 def _columns(head: bytes) -> list[str]:
     """Return the columns that the header announces, [] when it is not SwisTrack's."""
     line = first_line(head)
@@ -142,19 +159,15 @@ class SwisTrackParticlesLoader:
         """Read every particle; world coordinates where the run was calibrated."""
         table = read_table(path, TableLayout("\t", PARTICLES, 1, (0, 2, 3, 4, 5, 7), (1,)))
         numbers = table.numbers
-        calibrated = bool(numbers[4].any() or numbers[5].any())
-        world = calibrated and options.metres_per_pixel is None
         order = order_in_frame(numbers[0])
-        count = int(order.max()) + 1
+        names = [*map(str, range(int(order.max()) + 1))]
         timed = options.frame_rate_hz is None
-        clock = _times(table) if timed else numbers[0]
-        x, y, theta = (numbers[at] for at in ((4, 5, 7) if world else (2, 3, 7)))
-        bodies = split_bodies(RawBody("", clock, x, y, theta), order, [*map(str, range(count))])
+        rows = (_times(table) if timed else numbers[0], *(numbers[at] for at in (2, 3, 4, 5, 7)))
         note = (
             "particles.csv holds no identities: bodies are distinguished by their order in a frame"
         )
-        clock_unit, note = "s" if timed else "frame", note if count > 1 else ""
-        return _recording(bodies, clock_unit, world=world, note=note)
+        note = note if len(names) > 1 else ""
+        return _of_particles(rows, order, names, "s" if timed else "frame", options, note)
 
 
 def _times(table: Table) -> Array:
@@ -187,21 +200,18 @@ class SwisTrackNmeaLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every particle; world coordinates where the run was calibrated."""
         values, ids = _particles(path)
-        frame, image_x, image_y, world_x, world_y, theta = values
+        frame = values[0]
         if not frame.size:
             raise FormatError("holds no $PARTICLE")
-        world = bool(world_x.any() or world_y.any()) and options.metres_per_pixel is None
         order = order_in_frame(frame)
         labels, codes = np.unique(ids, return_inverse=True)
         # Some senders give every particle the same id: then only their order tells them apart.
         repeated = np.unique(np.stack([frame, ids]), axis=1).shape[1] < frame.size
         names = [str(index) for index in (range(int(order.max()) + 1) if repeated else labels)]
-        x, y = (world_x, world_y) if world else (image_x, image_y)
-        rows = RawBody("", frame, x, y, theta)
-        bodies = split_bodies(rows, order if repeated else codes.astype(np.int32), names)
+        of_row = order if repeated else codes.astype(np.int32)
         note = "ids repeat within a frame: bodies are distinguished by their order in the frame"
         note = note if repeated else ""
-        return _recording(bodies, "frame", world=world, note=note)
+        return _of_particles(values, of_row, names, "frame", options, note)
 
 
 def _particles(path: Path) -> tuple[Array, Integers]:
@@ -209,8 +219,8 @@ def _particles(path: Path) -> tuple[Array, Integers]:
     values = array("d")
     ids = array("q")
     frame = float("nan")
-    with open_binary(path) as file:
-        for line, raw in lines_of(file):
+    for first, block in blocks_of(path):
+        for line, raw in enumerate(block.split(b"\n"), start=first):
             text = raw.strip()
             if text.startswith((b"$FRAMENUMBER,", b"$PARTICLE,")):
                 command, *arguments = _verified(text, line).split(",")

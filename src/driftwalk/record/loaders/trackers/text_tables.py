@@ -16,6 +16,7 @@ it varies. A target is named by its arena where there are several.
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -25,25 +26,21 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.cleaning.several_bodies import (
-    codes_in_arenas,
-    number_codes,
-    split_bodies,
-)
+from driftwalk.record.cleaning.clean import codes_in_arenas, number_codes, split_bodies
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.loaders.json_formats import bounded_text, column_of
 from driftwalk.record.loaders.plain import HeadedFormat, described, side_by_side
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.tables.in_memory import MemorySource
 from driftwalk.record.tables.rows import recording_of
-from driftwalk.record.text import header_rows, read_head, read_table
-from driftwalk.record.text_head import (
+from driftwalk.record.tables.text_source import (
     first_line,
     first_lines,
     first_row,
     is_numeric_row,
     read_header,
 )
+from driftwalk.record.text import header_rows, read_head, read_table
 
 ANIMALTA: Final = ("Frame", "Time", "Arena", "Ind", "X", "Y")
 HALF_DIGIT_S: Final = 0.0051
@@ -338,15 +335,18 @@ class KinoveaLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every track."""
         rows: list[list[str]] = []
-        track = ""
+        track, known = "", set[str]()
+        again: dict[str, int] = defaultdict(lambda: 1)
         for number, line in enumerate(bounded_text(path).decode("utf-8", "replace").split("\n"), 1):
             fields = line.split()
             if line.startswith("#"):  # several tracks may have one name
-                name, known = line.strip("# \r"), {row[3] for row in rows}
-                others = (f"{name} {at}" for at in range(2, len(known) + 3))
-                track = next(one for one in (name, *others) if one not in known)
+                name = line.strip("# \r")
+                # The first of a name has no number.
+                while (track := f"{name} {again[name]}".removesuffix(" 1")) in known:
+                    again[name] += 1
             elif len(fields) == 3:
                 rows.append([_HUNDREDTHS.sub(r"\1.\2", fields[0]), *fields[1:], track])
+                known.add(track)
             elif fields:
                 raise FormatError(f"expected T X Y, got {len(fields)} fields", line=number)
         columns = [column_of([*column]) for column in zip(*rows, strict=True)] or [np.zeros(0)] * 4

@@ -7,7 +7,7 @@ Points of a pose are in pixels.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -20,8 +20,8 @@ from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.npz import ZIP, members, opened_npz
+from driftwalk.record.tables.text_source import first_names, first_row
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_names, first_row
 from driftwalk.schema.stores.netcdf import file_start
 
 CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")
@@ -37,27 +37,25 @@ _NUMBER: Final = re.compile(r"(.*?)_?(?:fish|id)?(\d+)\.(?:npz|csv)")
 
 @dataclass(frozen=True)
 class _Columns:
-    """Columns of one individual, read when they are asked for."""
+    """Columns of one individual by their names, read when they are asked for."""
 
-    names: set[str]
-    read: Callable[[str], Array]
-    """Returns a column by its name as a new array."""
+    arrays: Mapping[str, npt.NDArray[Any]]
     length_unit: str
     cm_per_pixel: float | None = None
     frame_rate_hz: float | None = None
 
     def recording(self, name: str, options: ReadOptions) -> RawRecording:
         """Return the one body."""
-        if "frame" not in self.names:
+        if "frame" not in self.arrays:
             raise FormatError("has no 'frame'")
-        timed = "time" in self.names and options.frame_rate_hz is None
+        timed = "time" in self.arrays and options.frame_rate_hz is None
         clock = self.read("time" if timed else "frame")
-        centres = (name for name in CENTRES if set(_keys(name)) <= self.names)
+        centres = (name for name in CENTRES if set(_keys(name)) <= self.arrays.keys())
         x, y = self.point(options.keypoint or next(centres, CENTRES[0]))
         theta = None
         if options.heading is not None:
             theta = angle_between(*map(self.point, options.heading))
-        elif "ANGLE" in self.names:
+        elif "ANGLE" in self.arrays:
             theta = self.read("ANGLE")
             theta[~np.isfinite(theta)] = np.nan
         return RawRecording(
@@ -70,11 +68,15 @@ class _Columns:
             notes=[ASSUMED] if self.cm_per_pixel is None else [],
         )
 
+    def read(self, name: str) -> Array:
+        """Return a column as a new array."""
+        return _numbers(self.arrays[name], name)
+
     def point(self, name: str) -> tuple[Array, Array]:
         """Return x and y of a point of the individual, NaN where it was not seen."""
         keys = _keys(name)
-        if not set(keys) <= self.names:
-            known = [one for one in (*CENTRES, *POSE) if set(_keys(one)) <= self.names]
+        if not set(keys) <= self.arrays.keys():
+            known = [one for one in (*CENTRES, *POSE) if set(_keys(one)) <= self.arrays.keys()]
             raise FormatError(
                 f"has no point '{name}' in x and y; there are {', '.join(known) or 'none'}"
             )
@@ -82,7 +84,7 @@ class _Columns:
         if x.size != y.size:
             raise FormatError("the arrays have different lengths")
         lost = ~(np.isfinite(x) & np.isfinite(y))
-        if "missing" in self.names:  # a position may be interpolated there
+        if "missing" in self.arrays:  # a position may be interpolated there
             missing = self.read("missing")
             lost |= missing == 1.0 if missing.size == lost.size else False
         x[lost] = y[lost] = np.nan
@@ -165,13 +167,8 @@ def _read(path: Path, options: ReadOptions) -> RawRecording:
         scale = _first(arrays, "cm_per_pixel")
         # Without it, what is called cm may be pixels.
         unit = options.length_unit or ("px" if options.metres_per_pixel else "cm")
-        return _Columns(
-            set(arrays),
-            lambda name: _numbers(arrays[name], name),
-            unit if scale is None else "cm",
-            scale,
-            _first(arrays, "frame_rate"),
-        ).recording(name, options)
+        unit, rate = unit if scale is None else "cm", _first(arrays, "frame_rate")
+        return _Columns(arrays, unit, scale, rate).recording(name, options)
 
 
 def _numbers(values: npt.NDArray[Any], name: str) -> Array:
@@ -203,7 +200,7 @@ def _of_csv(path: Path) -> _Columns:
         raise FormatError("the columns of positions name different units", line=1)
     table = read_table(path, TableLayout(",", names, 1, tuple(used)))
     columns = {bare: table.numbers[at] for at, bare in used.items()}
-    return _Columns(set(columns), lambda name: columns[name], next(iter(units), ""))
+    return _Columns(columns, next(iter(units), ""))
 
 
 LOADER = TrexLoader()

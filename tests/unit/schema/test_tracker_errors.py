@@ -13,14 +13,14 @@ from hypothesis import given, strategies as st
 
 import driftwalk as dw
 from driftwalk.likelihood.preparation import prepare
-from driftwalk.record.cleaning.outliers import (
+from driftwalk.schema import Track, body_track
+from driftwalk.schema.answers.facts import facts_of
+from driftwalk.schema.tracker_errors import (
     OUTLIER,
     outliers_in,
     without_far_outliers,
     without_outliers,
 )
-from driftwalk.schema import Track, body_track
-from driftwalk.schema.answers.facts import facts_of
 
 SECONDS = 300.0
 NOISE_M = 3e-4

@@ -1,1 +1,0 @@
-"""Formats of programs that follow the points of bodies in videos."""
