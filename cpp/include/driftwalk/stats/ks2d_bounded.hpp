@@ -86,9 +86,7 @@ public:
 
   bool run(KsFound found[2], std::int64_t& tied) {
     // The lists serve before the points are in order.
-    const KsNumbers lists[2] = {
-        {of_column_.first, reinterpret_cast<std::int32_t*>(of_column_.second)},
-        {of_row_.first, reinterpret_cast<std::int32_t*>(of_row_.second)}};
+    double* const lists[4] = {of_column_.first, of_column_.second, of_row_.first, of_row_.second};
     KsBucketer bucketer(samples_.n, samples_.buckets, at_, lists);
     if (!bucketer.cut(samples_.x, columns_) || !bucketer.cut(samples_.y, rows_)) {
       return false;
@@ -150,13 +148,19 @@ private:
     for (std::int64_t c = 0; c < columns_.count; ++c) {
       next_in_column[c] = columns_.begin[c];
     }
+    // One order after the other: both together meet more memory than the inner cache holds.
     std::uint32_t point = 0;
     for (int sample = 0; sample < 2; ++sample) {
       for (std::int64_t i = 0; i < samples_.n[sample]; ++i, ++point) {
-        const std::uint16_t column = columns_.of_point[point];
-        const std::uint16_t row = rows_.of_point[point];
-        in_row_[next[row]++] = KsRecord(point, column, samples_.y[sample][i]);
-        in_column_[next_in_column[column]++] = KsRecord(point, row, samples_.x[sample][i]);
+        in_row_[next[rows_.of_point[point]]++] =
+            KsRecord(point, columns_.of_point[point], samples_.y[sample][i]);
+      }
+    }
+    point = 0;
+    for (int sample = 0; sample < 2; ++sample) {
+      for (std::int64_t i = 0; i < samples_.n[sample]; ++i, ++point) {
+        in_column_[next_in_column[columns_.of_point[point]]++] =
+            KsRecord(point, rows_.of_point[point], samples_.x[sample][i]);
       }
     }
   }

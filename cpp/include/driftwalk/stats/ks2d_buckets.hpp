@@ -8,6 +8,7 @@
 #pragma once
 
 #include "driftwalk/config.hpp"
+#include "driftwalk/stats/ks2d_kernel.hpp"
 #include "driftwalk/stats/ks2d_sweep.hpp"
 
 #include <cstdint>
@@ -22,8 +23,6 @@ inline T* ks_take(char*& at, std::int64_t count) {
   return begin;
 }
 
-inline constexpr std::uint16_t ks_no_bucket = 0xFFFF;
-
 // The buckets of one axis.
 struct KsBuckets {
   std::uint16_t* of_point; // (n) sample 2 after sample 1
@@ -31,12 +30,6 @@ struct KsBuckets {
   std::uint8_t* is_value;  // by bucket: 1 where all its numbers are known to be equal
   std::int32_t* begin;     // by bucket, and the end: its first point where they lie in order
   std::int64_t count;
-};
-
-// Numbers with the points that they belong to.
-struct KsNumbers {
-  double* value;
-  std::int32_t* point;
 };
 
 struct KsEvenScale {
@@ -56,30 +49,23 @@ struct KsRange {
   double lowest;
   double highest;
 
-  // Several at a time: each waits for its last comparison.
   void widen(const double* values, std::int64_t n) {
-    constexpr int lanes = 16;
-    double low[lanes];
-    double high[lanes];
-    for (int lane = 0; lane < lanes; ++lane) {
-      low[lane] = lowest;
-      high[lane] = highest;
-    }
+    using Vector = KsVector<double>;
+    typename Vector::Type low = Vector::Type{} + lowest;
+    typename Vector::Type high = Vector::Type{} + highest;
     std::int64_t i = 0;
-    for (; i + lanes <= n; i += lanes) {
-      for (int lane = 0; lane < lanes; ++lane) {
-        const double value = values[i + lane];
-        low[lane] = value < low[lane] ? value : low[lane];
-        high[lane] = value > high[lane] ? value : high[lane];
-      }
+    for (; i + Vector::lanes <= n; i += Vector::lanes) {
+      const typename Vector::Type value = Vector::load(values + i);
+      low = value < low ? value : low;
+      high = value > high ? value : high;
     }
-    for (; i < n; ++i) {
-      low[0] = values[i] < low[0] ? values[i] : low[0];
-      high[0] = values[i] > high[0] ? values[i] : high[0];
-    }
-    for (int lane = 0; lane < lanes; ++lane) {
+    for (int lane = 0; lane < Vector::lanes; ++lane) {
       lowest = low[lane] < lowest ? low[lane] : lowest;
       highest = high[lane] > highest ? high[lane] : highest;
+    }
+    for (; i < n; ++i) {
+      lowest = values[i] < lowest ? values[i] : lowest;
+      highest = values[i] > highest ? values[i] : highest;
     }
   }
 };
@@ -92,77 +78,113 @@ inline int ks_bit_width(std::int64_t n) {
   return bits;
 }
 
+// Numbers in order, equal ones once; returns how many are left.
+inline std::int32_t ks_sort_unique(double* values, std::int32_t n) {
+  std::int32_t gap = 1;
+  while (gap < n / 3) {
+    gap = 3 * gap + 1;
+  }
+  for (; gap > 0; gap /= 3) {
+    for (std::int32_t i = gap; i < n; ++i) {
+      const double value = values[i];
+      std::int32_t j = i;
+      for (; j >= gap && values[j - gap] > value; j -= gap) {
+        values[j] = values[j - gap];
+      }
+      values[j] = value;
+    }
+  }
+  std::int32_t kept = 0;
+  for (std::int32_t i = 0; i < n; ++i) {
+    const double value = values[i];
+    kept += kept == 0 || values[kept - 1] != value;
+    values[kept - 1] = value;
+  }
+  return kept;
+}
+
 class KsBucketer {
 public:
-  // `lists`: room for n + 1 numbers in each.
+  // `list`: room for n numbers of 64 bits in each.
   KsBucketer(const std::int64_t n[2], const KsBucketSizes& sizes, char* scratch,
-             const KsNumbers lists[2])
-      : n_{n[0], n[1]}, least_(std::int32_t(sizes.points)), lists_{lists[0], lists[1]} {
-    bins_ = sizes.bins;
-    counts_ = ks_take<std::int32_t>(scratch, bins_);
-    ends_ = ks_take<End>(scratch, bins_);
-    bucket_ = ks_take<std::uint16_t>(scratch, bins_);
-    bin_ = ks_take<std::uint16_t>(scratch, n[0] + n[1]);
-  }
+             double* const lists[4])
+      : n_{n[0], n[1]}, least_(std::int32_t(sizes.points)), bins_(sizes.bins),
+        counts_{ks_take<std::int32_t>(scratch, bins_), ks_take<std::int32_t>(scratch, bins_)},
+        heavy_(ks_take<Heavy>(scratch, bins_)), bucket_(ks_take<std::uint16_t>(scratch, bins_)),
+        bin_(ks_take<std::uint16_t>(scratch, n[0] + n[1])),
+        point_(reinterpret_cast<std::int32_t*>(lists[0])),
+        part_(reinterpret_cast<std::int32_t*>(lists[1])), cut_(lists[2]),
+        part_counts_(reinterpret_cast<PartCounts*>(lists[3])) {}
 
-  // False where the numbers crowd too much for even scales.
+  // False where the range of the numbers is too large or too small for an even scale.
   bool cut(const double* const values[2], KsBuckets& buckets) {
     buckets_ = &buckets;
     buckets.count = 0;
+    buckets.size[0][0] = buckets.size[1][0] = 0;
     KsRange range{values[0][0], values[0][0]};
     range.widen(values[0], n_[0]);
     range.widen(values[1], n_[1]);
-    const std::int64_t n = n_[0] + n_[1];
     if (range.lowest == range.highest) {
-      for (std::int64_t i = 0; i < n; ++i) {
-        bin_[i] = 0;
+      for (std::int64_t i = 0; i < n_[0] + n_[1]; ++i) {
+        buckets.of_point[i] = 0;
       }
-      bucket_[0] = 0;
-      buckets.is_value[0] = 1;
-      buckets.count = 1;
-      name_and_count();
-      return true;
+      fill(std::int32_t(n_[0]), std::int32_t(n_[1]));
+      close(true);
+    } else {
+      KsEvenScale scale;
+      if (!scale.set(range.lowest, range.highest, bins_)) {
+        return false;
+      }
+      deal(values, scale);
+      heavy_points_ = 0;
+      if (is_crowded()) {
+        place_cuts(values);
+        deal_heavy(values);
+      }
+      join_bins();
+      name();
     }
-    KsEvenScale scale;
-    if (!scale.set(range.lowest, range.highest, bins_)) {
-      return false;
+    std::int32_t begin = 0;
+    for (std::int64_t b = 0; b < buckets.count; ++b) {
+      buckets.begin[b] = begin;
+      begin += buckets.size[0][b] + buckets.size[1][b];
     }
-    deal(values, scale);
-    if (is_crowded()) {
-      list_heavy(values);
-    }
-    if (!join_bins()) {
-      return false;
-    }
-    name_and_count();
+    buckets.begin[buckets.count] = begin;
     return true;
   }
 
 private:
-  // Where the next number of a bin goes in the list.
-  struct End {
-    std::int32_t at;
-    std::int32_t step;
+  static constexpr int block = 256;
+
+  // Where the cuts of a heavy bin begin, and how many there are; infinity comes behind them.
+  struct Heavy {
+    std::int32_t begin;
+    std::int32_t count;
+  };
+  // Points of a part of a heavy bin: parts are the cuts and what lies between them.
+  struct PartCounts {
+    std::int32_t of[2];
   };
 
   void deal(const double* const values[2], const KsEvenScale& scale) {
-    for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      counts_[bin] = 0;
-    }
     std::uint16_t* bin = bin_;
     for (int sample = 0; sample < 2; ++sample) {
+      std::int32_t* const counts = counts_[sample];
+      for (std::int64_t b = 0; b < bins_; ++b) {
+        counts[b] = 0;
+      }
       const double* const value = values[sample];
       for (std::int64_t i = 0; i < n_[sample]; ++i) {
         bin[i] = std::uint16_t(scale.bin(value[i]));
       }
+      for (std::int64_t i = 0; i < n_[sample]; ++i) {
+        ++counts[bin[i]];
+      }
       bin += n_[sample];
-    }
-    for (std::int64_t i = 0; i < n_[0] + n_[1]; ++i) {
-      ++counts_[bin_[i]];
     }
   }
 
-  bool is_heavy(std::int64_t bin) const { return counts_[bin] > 2 * least_; }
+  bool is_heavy(std::int64_t bin) const { return counts_[0][bin] + counts_[1][bin] > 2 * least_; }
   bool is_crowded() const {
     bool heavy = false;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
@@ -171,151 +193,168 @@ private:
     return heavy;
   }
 
-  // The numbers of heavy bins, bin by bin; all others are written behind the end.
-  void list_heavy(const double* const values[2]) {
-    const std::int32_t trash = std::int32_t(n_[0] + n_[1]);
-    std::int32_t end = 0;
+  // Some numbers of every heavy bin, in order and each once.
+  void place_cuts(const double* const values[2]) {
+    const std::int64_t n = n_[0] + n_[1];
+    const std::int64_t step = least_ / 2;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      const bool heavy = is_heavy(bin);
-      ends_[bin] = {heavy ? end : trash, heavy};
-      end += heavy ? counts_[bin] : 0;
+      heavy_[bin] = {0, 0};
     }
-    std::int32_t point = 0;
-    for (int sample = 0; sample < 2; ++sample) {
-      for (std::int64_t i = 0; i < n_[sample]; ++i, ++point) {
-        End& to = ends_[bin_[point]];
-        lists_[0].value[to.at] = values[sample][i];
-        lists_[0].point[to.at] = point;
-        to.at += to.step;
+    for (std::int64_t i = 0; i < n; i += step) {
+      heavy_[bin_[i]].count += is_heavy(bin_[i]);
+    }
+    std::int32_t begin = 1;
+    for (std::int64_t bin = 0; bin < bins_; ++bin) {
+      heavy_[bin].begin = begin;
+      begin += is_heavy(bin) ? heavy_[bin].count + 1 : 0;
+      heavy_[bin].count = 0;
+    }
+    parts_ = 2 * begin;
+    for (std::int64_t i = 0; i < n; i += step) {
+      if (is_heavy(bin_[i])) {
+        Heavy& heavy = heavy_[bin_[i]];
+        cut_[heavy.begin + heavy.count++] = i < n_[0] ? values[0][i] : values[1][i - n_[0]];
       }
     }
-  }
-
-  // Every bin gets its bucket.
-  bool join_bins() {
-    std::int32_t filled = 0;
+    cut_[0] = 0;
+    search_steps_ = 0;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
       if (is_heavy(bin)) {
-        close(filled);
-        bucket_[bin] = ks_no_bucket;
-        if (!deal_again(0, ends_[bin].at - counts_[bin], counts_[bin], 0)) {
-          return false;
+        Heavy& heavy = heavy_[bin];
+        const std::int32_t all = heavy.count;
+        heavy.count = ks_sort_unique(cut_ + heavy.begin, all);
+        for (std::int32_t i = heavy.count; i <= all; ++i) {
+          cut_[heavy.begin + i] = __builtin_inf();
         }
+        const int steps = ks_bit_width(heavy.count);
+        search_steps_ = steps > search_steps_ ? steps : search_steps_;
+      }
+    }
+    for (std::int64_t i = 0; i < std::int64_t(1) << search_steps_; ++i) {
+      cut_[begin + i] = __builtin_inf();
+    }
+  }
+
+  // The part of every point of a heavy bin: twice the number of smaller cuts, and one more where it
+  // lies on a cut.
+  void deal_heavy(const double* const values[2]) {
+    for (std::int32_t part = 0; part < parts_; ++part) {
+      part_counts_[part] = {{0, 0}};
+    }
+    std::int64_t end = 0;
+    std::int32_t point = 0;
+    for (int sample = 0; sample < 2; ++sample) {
+      const std::int64_t begin = end;
+      const double* const value = values[sample] - point;
+      for (std::int64_t i = 0; i < n_[sample]; ++i, ++point) {
+        point_[end] = point;
+        end += is_heavy(bin_[point]);
+      }
+      for (std::int64_t k = begin; k < end; k += block) {
+        find_parts(value, k, end - k < block ? int(end - k) : block);
+      }
+      for (std::int64_t k = begin; k < end; ++k) {
+        ++part_counts_[part_[k]].of[sample];
+      }
+    }
+    heavy_points_ = end;
+  }
+
+  // Many searches at a time: each waits for its last comparison.
+  void find_parts(const double* values, std::int64_t begin, int size) {
+    double own[block];
+    std::int64_t at[block];
+    for (int i = 0; i < size; ++i) {
+      own[i] = values[point_[begin + i]];
+      at[i] = heavy_[bin_[point_[begin + i]]].begin;
+    }
+    const double* const cuts = cut_;
+    for (std::int64_t half = std::int64_t(1) << search_steps_ >> 1; half > 0; half /= 2) {
+      for (int i = 0; i < size; ++i) {
+        at[i] += half & -std::int64_t(cuts[at[i] + half - 1] < own[i]);
+      }
+    }
+    for (int i = 0; i < size; ++i) {
+      part_[begin + i] = std::int32_t(2 * at[i]) + (cuts[at[i]] == own[i]);
+    }
+  }
+
+  // Every bin and every part of a heavy one gets its bucket.
+  void join_bins() {
+    for (std::int64_t bin = 0; bin < bins_; ++bin) {
+      if (is_heavy(bin)) {
+        join_parts(heavy_[bin]);
       } else {
         bucket_[bin] = std::uint16_t(buckets_->count);
-        fill(counts_[bin], filled);
-      }
-    }
-    close(filled);
-    return buckets_->count < ks_no_bucket;
-  }
-
-  void fill(std::int32_t points, std::int32_t& filled) {
-    filled += points;
-    if (filled >= least_) {
-      close(filled);
-    }
-  }
-  void close(std::int32_t& filled) {
-    if (filled > 0) {
-      buckets_->is_value[buckets_->count++] = 0;
-      filled = 0;
-    }
-  }
-  void put_all(const KsNumbers& numbers, std::int64_t begin, std::int64_t n) {
-    for (std::int64_t i = begin; i < begin + n; ++i) {
-      buckets_->of_point[numbers.point[i]] = std::uint16_t(buckets_->count);
-    }
-  }
-
-  // Cut a part of a list on a scale of its own; the other list takes the numbers in order of bins.
-  bool deal_again(int list, std::int64_t begin, std::int64_t n, int depth) {
-    constexpr int most_depth = 4;
-    constexpr int most_bits = 10;
-    const KsNumbers from = lists_[list];
-    const KsNumbers to = lists_[1 - list];
-    KsRange range{from.value[begin], from.value[begin]};
-    range.widen(from.value + begin, n);
-    if (range.lowest == range.highest) {
-      put_all(from, begin, n);
-      buckets_->is_value[buckets_->count++] = 1;
-      return true;
-    }
-    int bits = ks_bit_width(n) - 2;
-    bits = bits < 4 ? 4 : bits > most_bits ? most_bits : bits;
-    KsEvenScale scale;
-    if (depth == most_depth || !scale.set(range.lowest, range.highest, std::int64_t(1) << bits)) {
-      return false;
-    }
-    std::int32_t ends[1 << most_bits] = {};
-    for (std::int64_t i = begin; i < begin + n; ++i) {
-      ++ends[scale.bin(from.value[i])];
-    }
-    std::int32_t sum = std::int32_t(begin);
-    for (std::int64_t bin = 0; bin < std::int64_t(1) << bits; ++bin) {
-      const std::int32_t size = ends[bin];
-      ends[bin] = sum;
-      sum += size;
-    }
-    for (std::int64_t i = begin; i < begin + n; ++i) {
-      const std::int32_t at = ends[scale.bin(from.value[i])]++;
-      to.value[at] = from.value[i];
-      to.point[at] = from.point[i];
-    }
-    std::int32_t filled = 0;
-    std::int64_t done = begin;
-    for (std::int64_t bin = 0; bin < std::int64_t(1) << bits; ++bin) {
-      const std::int32_t size = std::int32_t(ends[bin] - done);
-      if (size > 2 * least_) {
-        close(filled);
-        if (!deal_again(1 - list, done, size, depth + 1)) {
-          return false;
+        fill(counts_[0][bin], counts_[1][bin]);
+        if (filled() >= least_) {
+          close(false);
         }
-      } else {
-        put_all(to, done, size);
-        fill(size, filled);
       }
-      done = ends[bin];
     }
-    close(filled);
-    return buckets_->count < ks_no_bucket;
+    if (filled() > 0) {
+      close(false);
+    }
   }
 
-  void name_and_count() {
-    std::uint16_t* of_point = buckets_->of_point;
-    const std::uint16_t* bin = bin_;
-    for (int sample = 0; sample < 2; ++sample) {
-      std::int32_t* const size = buckets_->size[sample];
-      for (std::int64_t b = 0; b < buckets_->count; ++b) {
-        size[b] = 0;
+  void join_parts(const Heavy& heavy) {
+    const std::int32_t end = 2 * (heavy.begin + heavy.count) + 1;
+    for (std::int32_t part = 2 * heavy.begin; part < end; ++part) {
+      PartCounts& counts = part_counts_[part];
+      const bool is_value = part % 2 != 0 && counts.of[0] + counts.of[1] > least_;
+      const bool is_large = is_value || counts.of[0] + counts.of[1] > 2 * least_;
+      if (is_large && filled() > 0) {
+        close(false);
       }
-      for (std::int64_t i = 0; i < n_[sample]; ++i) {
-        const std::uint16_t bucket = bucket_[bin[i]];
-        // Points that were dealt again have theirs already.
-        of_point[i] = bucket == ks_no_bucket ? of_point[i] : bucket;
-        ++size[of_point[i]];
+      const std::int32_t bucket = std::int32_t(buckets_->count);
+      fill(counts.of[0], counts.of[1]);
+      if (filled() >= least_) {
+        close(is_value);
       }
-      of_point += n_[sample];
-      bin += n_[sample];
+      counts.of[0] = bucket;
     }
-    std::int32_t begin = 0;
-    for (std::int64_t b = 0; b < buckets_->count; ++b) {
-      buckets_->begin[b] = begin;
-      begin += buckets_->size[0][b] + buckets_->size[1][b];
+  }
+
+  // The bucket that is being filled comes after those that are counted.
+  std::int32_t filled() const {
+    return buckets_->size[0][buckets_->count] + buckets_->size[1][buckets_->count];
+  }
+  void fill(std::int32_t first, std::int32_t second) {
+    buckets_->size[0][buckets_->count] += first;
+    buckets_->size[1][buckets_->count] += second;
+  }
+  void close(bool is_value) {
+    buckets_->is_value[buckets_->count++] = is_value;
+    buckets_->size[0][buckets_->count] = buckets_->size[1][buckets_->count] = 0;
+  }
+
+  void name() {
+    std::uint16_t* const of_point = buckets_->of_point;
+    for (std::int64_t i = 0; i < n_[0] + n_[1]; ++i) {
+      of_point[i] = bucket_[bin_[i]];
     }
-    buckets_->begin[buckets_->count] = begin;
+    for (std::int64_t k = 0; k < heavy_points_; ++k) {
+      of_point[point_[k]] = std::uint16_t(part_counts_[part_[k]].of[0]);
+    }
   }
 
   std::int64_t n_[2];
   std::int32_t least_;
-  KsNumbers lists_[2];
   KsBuckets* buckets_ = nullptr;
-  std::int64_t bins_;
   // By bin.
-  std::int32_t* counts_;
-  End* ends_;
+  std::int64_t bins_;
+  std::int32_t* counts_[2];
+  Heavy* heavy_;
   std::uint16_t* bucket_;
   std::uint16_t* bin_; // by point
+  // The points of heavy bins, and where they are cut.
+  std::int64_t heavy_points_ = 0;
+  std::int32_t* point_;
+  std::int32_t* part_;
+  double* cut_;
+  std::int32_t parts_ = 0;
+  int search_steps_ = 0;
+  PartCounts* part_counts_; // then the bucket of the part
 };
 
 DRIFTWALK_LANES_END
