@@ -110,7 +110,9 @@ public:
              double* const lists[4])
       : n_{n[0], n[1]}, least_(std::int32_t(sizes.points)), bins_(sizes.bins),
         counts_{ks_take<std::int32_t>(scratch, bins_), ks_take<std::int32_t>(scratch, bins_)},
-        heavy_(ks_take<Heavy>(scratch, bins_)), bucket_(ks_take<std::uint16_t>(scratch, bins_)),
+        cuts_begin_(ks_take<std::int32_t>(scratch, bins_)),
+        cuts_(ks_take<std::int32_t>(scratch, bins_)),
+        bucket_(ks_take<std::uint16_t>(scratch, bins_)),
         bin_(ks_take<std::uint16_t>(scratch, n[0] + n[1])),
         point_(reinterpret_cast<std::int32_t*>(lists[0])),
         part_(reinterpret_cast<std::int32_t*>(lists[1])), cut_(lists[2]),
@@ -154,13 +156,6 @@ public:
   }
 
 private:
-  static constexpr int block = 256;
-
-  // Where the cuts of a heavy bin begin, and how many there are; infinity comes behind them.
-  struct Heavy {
-    std::int32_t begin;
-    std::int32_t count;
-  };
   // Points of a part of a heavy bin: parts are the cuts and what lies between them.
   struct PartCounts {
     std::int32_t of[2];
@@ -184,7 +179,7 @@ private:
     }
   }
 
-  bool is_heavy(std::int64_t bin) const { return counts_[0][bin] + counts_[1][bin] > 2 * least_; }
+  bool is_heavy(std::int64_t bin) const { return counts_[0][bin] + counts_[1][bin] > 3 * least_; }
   bool is_crowded() const {
     bool heavy = false;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
@@ -193,89 +188,91 @@ private:
     return heavy;
   }
 
-  // Some numbers of every heavy bin, in order and each once.
+  // Some numbers of every heavy bin, in order and each once; infinity comes behind them.
   void place_cuts(const double* const values[2]) {
     const std::int64_t n = n_[0] + n_[1];
-    const std::int64_t step = least_ / 2;
+    const std::int64_t step = least_;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      heavy_[bin] = {0, 0};
+      cuts_[bin] = 0;
     }
     for (std::int64_t i = 0; i < n; i += step) {
-      heavy_[bin_[i]].count += is_heavy(bin_[i]);
+      ++cuts_[bin_[i]];
     }
-    std::int32_t begin = 1;
+    std::int32_t end = 1;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      heavy_[bin].begin = begin;
-      begin += is_heavy(bin) ? heavy_[bin].count + 1 : 0;
-      heavy_[bin].count = 0;
+      cuts_begin_[bin] = is_heavy(bin) ? end : -1;
+      end += is_heavy(bin) ? cuts_[bin] + 1 : 0;
+      cuts_[bin] = 0;
     }
-    parts_ = 2 * begin;
     for (std::int64_t i = 0; i < n; i += step) {
-      if (is_heavy(bin_[i])) {
-        Heavy& heavy = heavy_[bin_[i]];
-        cut_[heavy.begin + heavy.count++] = i < n_[0] ? values[0][i] : values[1][i - n_[0]];
+      const std::int64_t bin = bin_[i];
+      if (cuts_begin_[bin] >= 0) {
+        cut_[cuts_begin_[bin] + cuts_[bin]++] = i < n_[0] ? values[0][i] : values[1][i - n_[0]];
       }
     }
-    cut_[0] = 0;
-    search_steps_ = 0;
+    std::int32_t most = 0;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      if (is_heavy(bin)) {
-        Heavy& heavy = heavy_[bin];
-        const std::int32_t all = heavy.count;
-        heavy.count = ks_sort_unique(cut_ + heavy.begin, all);
-        for (std::int32_t i = heavy.count; i <= all; ++i) {
-          cut_[heavy.begin + i] = __builtin_inf();
+      if (cuts_begin_[bin] >= 0) {
+        double* const cut = cut_ + cuts_begin_[bin];
+        const std::int32_t all = cuts_[bin];
+        cuts_[bin] = ks_sort_unique(cut, all);
+        for (std::int32_t i = cuts_[bin]; i <= all; ++i) {
+          cut[i] = __builtin_inf();
         }
-        const int steps = ks_bit_width(heavy.count);
-        search_steps_ = steps > search_steps_ ? steps : search_steps_;
+        most = cuts_[bin] > most ? cuts_[bin] : most;
       }
     }
-    for (std::int64_t i = 0; i < std::int64_t(1) << search_steps_; ++i) {
-      cut_[begin + i] = __builtin_inf();
+    half_ = (std::int64_t(1) << ks_bit_width(most)) / 2;
+    cut_[0] = 0;
+    for (std::int64_t i = 0; i < 2 * half_; ++i) {
+      cut_[end + i] = __builtin_inf();
+    }
+    for (std::int32_t part = 0; part < 2 * end; ++part) {
+      part_counts_[part] = {{0, 0}};
     }
   }
 
   // The part of every point of a heavy bin: twice the number of smaller cuts, and one more where it
-  // lies on a cut.
+  // lies on a cut. Many searches at a time: each waits for its last comparison.
   void deal_heavy(const double* const values[2]) {
-    for (std::int32_t part = 0; part < parts_; ++part) {
-      part_counts_[part] = {{0, 0}};
-    }
-    std::int64_t end = 0;
-    std::int32_t point = 0;
-    for (int sample = 0; sample < 2; ++sample) {
-      const std::int64_t begin = end;
-      const double* const value = values[sample] - point;
-      for (std::int64_t i = 0; i < n_[sample]; ++i, ++point) {
-        point_[end] = point;
-        end += is_heavy(bin_[point]);
-      }
-      for (std::int64_t k = begin; k < end; k += block) {
-        find_parts(value, k, end - k < block ? int(end - k) : block);
-      }
-      for (std::int64_t k = begin; k < end; ++k) {
-        ++part_counts_[part_[k]].of[sample];
-      }
-    }
-    heavy_points_ = end;
-  }
-
-  // Many searches at a time: each waits for its last comparison.
-  void find_parts(const double* values, std::int64_t begin, int size) {
+    constexpr int block = 256;
     double own[block];
     std::int64_t at[block];
-    for (int i = 0; i < size; ++i) {
-      own[i] = values[point_[begin + i]];
-      at[i] = heavy_[bin_[point_[begin + i]]].begin;
-    }
-    const double* const cuts = cut_;
-    for (std::int64_t half = std::int64_t(1) << search_steps_ >> 1; half > 0; half /= 2) {
-      for (int i = 0; i < size; ++i) {
-        at[i] += half & -std::int64_t(cuts[at[i] + half - 1] < own[i]);
+    heavy_points_ = 0;
+    std::int64_t first = 0;
+    for (int sample = 0; sample < 2; ++sample) {
+      for (std::int64_t begin = 0; begin < n_[sample]; begin += block) {
+        const int size = n_[sample] - begin < block ? int(n_[sample] - begin) : block;
+        std::int32_t* const point = point_ + heavy_points_;
+        std::int32_t* const part = part_ + heavy_points_;
+        const double* const value = values[sample] + begin;
+        const std::uint16_t* const bin = bin_ + first + begin;
+        int heavy = 0;
+        for (int i = 0; i < size; ++i) {
+          const std::int32_t cuts_begin = cuts_begin_[bin[i]];
+          point[heavy] = i;
+          at[heavy] = cuts_begin;
+          heavy += cuts_begin >= 0;
+        }
+        for (int k = 0; k < heavy; ++k) {
+          own[k] = value[point[k]];
+          point[k] += std::int32_t(first + begin);
+        }
+        const double* const cut = cut_;
+        for (std::int64_t half = half_; half > 0; half /= 2) {
+          for (int k = 0; k < heavy; ++k) {
+            at[k] += half & -std::int64_t(cut[at[k] + half - 1] < own[k]);
+          }
+        }
+        for (int k = 0; k < heavy; ++k) {
+          part[k] = std::int32_t(2 * at[k]) + (cut[at[k]] == own[k]);
+        }
+        for (int k = 0; k < heavy; ++k) {
+          ++part_counts_[part[k]].of[sample];
+        }
+        heavy_points_ += heavy;
       }
-    }
-    for (int i = 0; i < size; ++i) {
-      part_[begin + i] = std::int32_t(2 * at[i]) + (cuts[at[i]] == own[i]);
+      first += n_[sample];
     }
   }
 
@@ -283,7 +280,7 @@ private:
   void join_bins() {
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
       if (is_heavy(bin)) {
-        join_parts(heavy_[bin]);
+        join_parts(2 * cuts_begin_[bin], 2 * cuts_[bin] + 1);
       } else {
         bucket_[bin] = std::uint16_t(buckets_->count);
         fill(counts_[0][bin], counts_[1][bin]);
@@ -297,9 +294,8 @@ private:
     }
   }
 
-  void join_parts(const Heavy& heavy) {
-    const std::int32_t end = 2 * (heavy.begin + heavy.count) + 1;
-    for (std::int32_t part = 2 * heavy.begin; part < end; ++part) {
+  void join_parts(std::int32_t begin, std::int32_t count) {
+    for (std::int32_t part = begin; part < begin + count; ++part) {
       PartCounts& counts = part_counts_[part];
       const bool is_value = part % 2 != 0 && counts.of[0] + counts.of[1] > least_;
       const bool is_large = is_value || counts.of[0] + counts.of[1] > 2 * least_;
@@ -344,7 +340,8 @@ private:
   // By bin.
   std::int64_t bins_;
   std::int32_t* counts_[2];
-  Heavy* heavy_;
+  std::int32_t* cuts_begin_; // -1: it is not heavy
+  std::int32_t* cuts_;
   std::uint16_t* bucket_;
   std::uint16_t* bin_; // by point
   // The points of heavy bins, and where they are cut.
@@ -352,8 +349,7 @@ private:
   std::int32_t* point_;
   std::int32_t* part_;
   double* cut_;
-  std::int32_t parts_ = 0;
-  int search_steps_ = 0;
+  std::int64_t half_ = 0;   // of the most cuts of a bin, a power of two
   PartCounts* part_counts_; // then the bucket of the part
 };
 

@@ -63,7 +63,7 @@ public:
       : samples_(samples), n_(samples.n[0] + samples.n[1]),
         tied_(ks_take<std::uint8_t>(scratch, n_)), before_(ks_take<std::int32_t>(scratch, n_)) {
     for (std::int64_t i = 0; i < n_; ++i) {
-      tied_[i] = 0;
+      tied_[i] = is_one_value(columns.buckets, i) | is_one_value(rows.buckets, i);
     }
     mark(columns, samples.x);
     mark(rows, samples.y);
@@ -78,6 +78,11 @@ public:
   }
 
 private:
+  // A bucket of one value holds more than one point: it was too many for a bin.
+  static bool is_one_value(const KsBuckets& buckets, std::int64_t point) {
+    return buckets.is_value[buckets.of_point[point]] != 0;
+  }
+
   // Every point is compared with those before it in its bucket whose hashes begin with the same
   // bits, from the last back to the first that is equal.
   void mark(const KsBucketed& axis, const double* const values[2]) {
@@ -93,9 +98,6 @@ private:
       const std::int32_t begin = buckets.begin[b];
       const std::int32_t end = buckets.begin[b + 1];
       if (buckets.is_value[b] != 0) {
-        for (std::int32_t k = begin; k < end; ++k) {
-          tied_[axis.records[k].point()] |= end - begin > 1;
-        }
         continue;
       }
       for (std::int32_t k = begin; k < end; ++k) {
