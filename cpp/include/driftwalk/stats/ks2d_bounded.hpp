@@ -76,6 +76,8 @@ public:
         at_(static_cast<char*>(samples.scratch)) {
     take_buckets(columns_);
     take_buckets(rows_);
+    tied_ = ks_take<std::uint8_t>(at_, n_);
+    lists_ = at_;
     in_column_ = ks_take<KsRecord>(at_, n_);
     in_row_ = ks_take<KsRecord>(at_, n_);
     bound_ = ks_take<Weight>(at_, n_);
@@ -85,9 +87,10 @@ public:
   }
 
   bool run(KsFound found[2], std::int64_t& tied) {
-    // The lists serve before the points are in order.
-    double* const lists[4] = {of_column_.first, of_column_.second, of_row_.first, of_row_.second};
-    KsBucketer bucketer(samples_.n, samples_.buckets, at_, lists);
+    for (std::int64_t i = 0; i < n_; ++i) {
+      tied_[i] = 0;
+    }
+    KsBucketer bucketer(samples_.n, samples_.buckets, tied_, lists_);
     if (!bucketer.cut(samples_.x, columns_) || !bucketer.cut(samples_.y, rows_)) {
       return false;
     }
@@ -100,9 +103,10 @@ public:
     for (int sample = 0; sample < 2; ++sample) {
       found[sample] = found_[sample];
     }
-    tied = samples_.counts_tied
-               ? KsTiedCounter(samples_, {columns_, in_column_}, {rows_, in_row_}, at_).count()
-               : 0;
+    tied =
+        samples_.counts_tied
+            ? KsTiedCounter(samples_, {columns_, in_column_}, {rows_, in_row_}, tied_, at_).count()
+            : 0;
     return true;
   }
 
@@ -120,9 +124,10 @@ private:
   void take_buckets(KsBuckets& buckets) {
     const std::int64_t most = samples_.buckets.most;
     buckets.of_point = ks_take<std::uint16_t>(at_, n_);
-    buckets.size[0] = ks_take<std::int32_t>(at_, most);
-    buckets.size[1] = ks_take<std::int32_t>(at_, most);
+    buckets.size[0] = ks_take<std::int32_t>(at_, most + 1);
+    buckets.size[1] = ks_take<std::int32_t>(at_, most + 1);
     buckets.is_value = ks_take<std::uint8_t>(at_, most);
+    buckets.knows_ties = ks_take<std::uint8_t>(at_, most);
     buckets.begin = ks_take<std::int32_t>(at_, most + 1);
   }
 
@@ -458,6 +463,8 @@ private:
   char* at_; // where free scratch begins
   KsBuckets columns_{};
   KsBuckets rows_{};
+  std::uint8_t* tied_; // by point: 1 where it is known to share a coordinate
+  char* lists_;        // where the memory of the lists below begins; it serves before they are made
   // In the order of columns.
   KsRecord* in_column_;
   Pair of_column_; // x and y, where the column is ready

@@ -25,10 +25,11 @@ inline T* ks_take(char*& at, std::int64_t count) {
 
 // The buckets of one axis.
 struct KsBuckets {
-  std::uint16_t* of_point; // (n) sample 2 after sample 1
-  std::int32_t* size[2];   // by bucket: points of each sample
-  std::uint8_t* is_value;  // by bucket: 1 where all its numbers are known to be equal
-  std::int32_t* begin;     // by bucket, and the end: its first point where they lie in order
+  std::uint16_t* of_point;  // (n) sample 2 after sample 1
+  std::int32_t* size[2];    // by bucket: points of each sample
+  std::uint8_t* is_value;   // by bucket: 1 where all its numbers are known to be equal
+  std::uint8_t* knows_ties; // by bucket: 1 where it is known which of its numbers are others' too
+  std::int32_t* begin;      // by bucket, and the end: its first point where they lie in order
   std::int64_t count;
 };
 
@@ -70,6 +71,14 @@ struct KsRange {
   }
 };
 
+// Equal for equal numbers: -0.0 + 0.0 is +0.0.
+inline std::uint64_t ks_bits(double value) {
+  const double one_zero = value + 0.0;
+  std::uint64_t bits;
+  __builtin_memcpy(&bits, &one_zero, sizeof bits);
+  return bits;
+}
+
 inline int ks_bit_width(std::int64_t n) {
   int bits = 0;
   while (n >> bits != 0) {
@@ -105,18 +114,26 @@ inline std::int32_t ks_sort_unique(double* values, std::int32_t n) {
 
 class KsBucketer {
 public:
-  // `list`: room for n numbers of 64 bits in each.
-  KsBucketer(const std::int64_t n[2], const KsBucketSizes& sizes, char* scratch,
-             double* const lists[4])
-      : n_{n[0], n[1]}, least_(std::int32_t(sizes.points)), bins_(sizes.bins),
-        counts_{ks_take<std::int32_t>(scratch, bins_), ks_take<std::int32_t>(scratch, bins_)},
-        cuts_begin_(ks_take<std::int32_t>(scratch, bins_)),
-        cuts_(ks_take<std::int32_t>(scratch, bins_)),
-        bucket_(ks_take<std::uint16_t>(scratch, bins_)),
-        bin_(ks_take<std::uint16_t>(scratch, n[0] + n[1])),
-        point_(reinterpret_cast<std::int32_t*>(lists[0])),
-        part_(reinterpret_cast<std::int32_t*>(lists[1])), cut_(lists[2]),
-        part_counts_(reinterpret_cast<PartCounts*>(lists[3])) {}
+  // `tied`: by point, set to 1 where its number is known to be another's too.
+  KsBucketer(const std::int64_t n[2], const KsBucketSizes& sizes, std::uint8_t* tied, char* scratch)
+      : n_{n[0], n[1]}, least_(std::int32_t(sizes.points)), tied_(tied), bins_(sizes.bins) {
+    const std::int64_t all = n[0] + n[1];
+    counts_[0] = ks_take<std::int32_t>(scratch, bins_);
+    counts_[1] = ks_take<std::int32_t>(scratch, bins_);
+    cuts_begin_ = ks_take<std::int32_t>(scratch, bins_);
+    cuts_ = ks_take<std::int32_t>(scratch, bins_);
+    bucket_ = ks_take<std::uint16_t>(scratch, bins_);
+    bin_ = ks_take<std::uint16_t>(scratch, all);
+    point_ = ks_take<std::int32_t>(scratch, all);
+    number_of_ = ks_take<std::int32_t>(scratch, all);
+    table_bits_ = ks_bit_width(all) - 2;
+    table_ = ks_take<std::int32_t>(scratch, std::int64_t(1) << table_bits_);
+    number_ = ks_take<double>(scratch, all);
+    counts_of_number_ = ks_take<Counts>(scratch, all);
+    part_ = ks_take<std::int32_t>(scratch, all);
+    cut_ = ks_take<double>(scratch, all);
+    counts_of_part_ = ks_take<Counts>(scratch, all);
+  }
 
   // False where the range of the numbers is too large or too small for an even scale.
   bool cut(const double* const values[2], KsBuckets& buckets) {
@@ -129,19 +146,20 @@ public:
     if (range.lowest == range.highest) {
       for (std::int64_t i = 0; i < n_[0] + n_[1]; ++i) {
         buckets.of_point[i] = 0;
+        tied_[i] = 1;
       }
-      fill(std::int32_t(n_[0]), std::int32_t(n_[1]));
-      close(true);
+      fill({{std::int32_t(n_[0]), std::int32_t(n_[1])}});
+      close(true, true);
     } else {
-      KsEvenScale scale;
-      if (!scale.set(range.lowest, range.highest, bins_)) {
+      if (!scale_.set(range.lowest, range.highest, bins_)) {
         return false;
       }
-      deal(values, scale);
-      heavy_points_ = 0;
+      deal(values);
+      heavy_points_ = numbers_ = 0;
       if (is_crowded()) {
+        list_heavy(values);
         place_cuts(values);
-        deal_heavy(values);
+        find_parts();
       }
       join_bins();
       name();
@@ -156,12 +174,12 @@ public:
   }
 
 private:
-  // Points of a part of a heavy bin: parts are the cuts and what lies between them.
-  struct PartCounts {
+  struct Counts {
     std::int32_t of[2];
+    std::int32_t all() const { return of[0] + of[1]; }
   };
 
-  void deal(const double* const values[2], const KsEvenScale& scale) {
+  void deal(const double* const values[2]) {
     std::uint16_t* bin = bin_;
     for (int sample = 0; sample < 2; ++sample) {
       std::int32_t* const counts = counts_[sample];
@@ -170,7 +188,7 @@ private:
       }
       const double* const value = values[sample];
       for (std::int64_t i = 0; i < n_[sample]; ++i) {
-        bin[i] = std::uint16_t(scale.bin(value[i]));
+        bin[i] = std::uint16_t(scale_.bin(value[i]));
       }
       for (std::int64_t i = 0; i < n_[sample]; ++i) {
         ++counts[bin[i]];
@@ -180,12 +198,13 @@ private:
   }
 
   bool is_heavy(std::int64_t bin) const { return counts_[0][bin] + counts_[1][bin] > 3 * least_; }
-  bool is_crowded() const {
-    bool heavy = false;
+  bool is_crowded() {
+    bool any = false;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      heavy |= is_heavy(bin);
+      bucket_[bin] = is_heavy(bin); // until the bins have buckets
+      any |= is_heavy(bin);
     }
-    return heavy;
+    return any;
   }
 
   // Some numbers of every heavy bin, in order and each once; infinity comes behind them.
@@ -200,19 +219,19 @@ private:
     }
     std::int32_t end = 1;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      cuts_begin_[bin] = is_heavy(bin) ? end : -1;
+      cuts_begin_[bin] = end;
       end += is_heavy(bin) ? cuts_[bin] + 1 : 0;
       cuts_[bin] = 0;
     }
     for (std::int64_t i = 0; i < n; i += step) {
       const std::int64_t bin = bin_[i];
-      if (cuts_begin_[bin] >= 0) {
+      if (is_heavy(bin)) {
         cut_[cuts_begin_[bin] + cuts_[bin]++] = i < n_[0] ? values[0][i] : values[1][i - n_[0]];
       }
     }
     std::int32_t most = 0;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      if (cuts_begin_[bin] >= 0) {
+      if (is_heavy(bin)) {
         double* const cut = cut_ + cuts_begin_[bin];
         const std::int32_t all = cuts_[bin];
         cuts_[bin] = ks_sort_unique(cut, all);
@@ -228,84 +247,118 @@ private:
       cut_[end + i] = __builtin_inf();
     }
     for (std::int32_t part = 0; part < 2 * end; ++part) {
-      part_counts_[part] = {{0, 0}};
+      counts_of_part_[part] = {{0, 0}};
     }
   }
 
-  // The part of every point of a heavy bin: twice the number of smaller cuts, and one more where it
-  // lies on a cut. Many searches at a time: each waits for its last comparison.
-  void deal_heavy(const double* const values[2]) {
-    constexpr int block = 256;
-    double own[block];
-    std::int64_t at[block];
-    heavy_points_ = 0;
-    std::int64_t first = 0;
+  // The points of heavy bins, and their numbers: each once, unless they are too many to tell.
+  void list_heavy(const double* const values[2]) {
+    for (std::int64_t slot = 0; slot < std::int64_t(1) << table_bits_; ++slot) {
+      table_[slot] = -1;
+    }
+    knows_ties_ = true;
+    std::int64_t end = 0;
+    std::int32_t point = 0;
     for (int sample = 0; sample < 2; ++sample) {
-      for (std::int64_t begin = 0; begin < n_[sample]; begin += block) {
-        const int size = n_[sample] - begin < block ? int(n_[sample] - begin) : block;
-        std::int32_t* const point = point_ + heavy_points_;
-        std::int32_t* const part = part_ + heavy_points_;
-        const double* const value = values[sample] + begin;
-        const std::uint16_t* const bin = bin_ + first + begin;
-        int heavy = 0;
-        for (int i = 0; i < size; ++i) {
-          const std::int32_t cuts_begin = cuts_begin_[bin[i]];
-          point[heavy] = i;
-          at[heavy] = cuts_begin;
-          heavy += cuts_begin >= 0;
-        }
-        for (int k = 0; k < heavy; ++k) {
-          own[k] = value[point[k]];
-          point[k] += std::int32_t(first + begin);
-        }
-        const double* const cut = cut_;
-        for (std::int64_t half = half_; half > 0; half /= 2) {
-          for (int k = 0; k < heavy; ++k) {
-            at[k] += half & -std::int64_t(cut[at[k] + half - 1] < own[k]);
-          }
-        }
-        for (int k = 0; k < heavy; ++k) {
-          part[k] = std::int32_t(2 * at[k]) + (cut[at[k]] == own[k]);
-        }
-        for (int k = 0; k < heavy; ++k) {
-          ++part_counts_[part[k]].of[sample];
-        }
-        heavy_points_ += heavy;
+      const std::int64_t begin = end;
+      const double* const value = values[sample] - point;
+      for (std::int64_t i = 0; i < n_[sample]; ++i, ++point) {
+        point_[end] = point;
+        end += bucket_[bin_[point]];
       }
-      first += n_[sample];
+      const std::int32_t* const table = table_;
+      const double* const number = number_;
+      const int shift = 64 - table_bits_;
+      for (std::int64_t k = begin; k < end; ++k) {
+        const double own = value[point_[k]];
+        const std::int64_t slot = std::int64_t((ks_bits(own) * 0x9E3779B97F4A7C15u) >> shift);
+        const std::int32_t found = table[slot];
+        number_of_[k] = found >= 0 && number[found] == own ? found : find_number(own, slot);
+      }
+      for (std::int64_t k = begin; k < end; ++k) {
+        ++counts_of_number_[number_of_[k]].of[sample];
+      }
+    }
+    heavy_points_ = end;
+  }
+
+  std::int32_t find_number(double value, std::int64_t slot) {
+    if (knows_ties_) {
+      const std::int64_t slots = std::int64_t(1) << table_bits_;
+      for (; table_[slot] >= 0; slot = (slot + 1) & (slots - 1)) {
+        if (number_[table_[slot]] == value) {
+          return table_[slot];
+        }
+      }
+      table_[slot] = numbers_;
+      knows_ties_ = numbers_ < slots / 2;
+    }
+    number_[numbers_] = value;
+    counts_of_number_[numbers_] = {{0, 0}};
+    return numbers_++;
+  }
+
+  // The part of every number of a heavy bin: twice the number of smaller cuts, and one more where
+  // it is a cut. Many searches at a time: each waits for its last comparison.
+  void find_parts() {
+    constexpr std::int32_t block = 256;
+    std::int64_t at[block];
+    const double* const cut = cut_;
+    for (std::int32_t begin = 0; begin < numbers_; begin += block) {
+      const std::int32_t size = numbers_ - begin < block ? numbers_ - begin : block;
+      const double* const own = number_ + begin;
+      for (std::int32_t i = 0; i < size; ++i) {
+        at[i] = cuts_begin_[scale_.bin(own[i])];
+      }
+      for (std::int64_t half = half_; half > 0; half /= 2) {
+        for (std::int32_t i = 0; i < size; ++i) {
+          at[i] += half & -std::int64_t(cut[at[i] + half - 1] < own[i]);
+        }
+      }
+      for (std::int32_t i = 0; i < size; ++i) {
+        const std::int32_t part = std::int32_t(2 * at[i]) + (cut[at[i]] == own[i]);
+        part_[begin + i] = part;
+        counts_of_part_[part].of[0] += counts_of_number_[begin + i].of[0];
+        counts_of_part_[part].of[1] += counts_of_number_[begin + i].of[1];
+      }
     }
   }
 
   // Every bin and every part of a heavy one gets its bucket.
   void join_bins() {
+    bool was_heavy = false;
     for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      if (is_heavy(bin)) {
+      const bool heavy = is_heavy(bin);
+      if (heavy != was_heavy && filled() > 0) {
+        close(false, was_heavy && knows_ties_);
+      }
+      was_heavy = heavy;
+      if (heavy) {
         join_parts(2 * cuts_begin_[bin], 2 * cuts_[bin] + 1);
       } else {
         bucket_[bin] = std::uint16_t(buckets_->count);
-        fill(counts_[0][bin], counts_[1][bin]);
+        fill({{counts_[0][bin], counts_[1][bin]}});
         if (filled() >= least_) {
-          close(false);
+          close(false, false);
         }
       }
     }
     if (filled() > 0) {
-      close(false);
+      close(false, was_heavy && knows_ties_);
     }
   }
 
   void join_parts(std::int32_t begin, std::int32_t count) {
     for (std::int32_t part = begin; part < begin + count; ++part) {
-      PartCounts& counts = part_counts_[part];
-      const bool is_value = part % 2 != 0 && counts.of[0] + counts.of[1] > least_;
-      const bool is_large = is_value || counts.of[0] + counts.of[1] > 2 * least_;
-      if (is_large && filled() > 0) {
-        close(false);
+      Counts& counts = counts_of_part_[part];
+      const bool is_value = part % 2 != 0 && counts.all() > least_;
+      if ((is_value || counts.all() > 2 * least_) && filled() > 0) {
+        close(false, knows_ties_);
       }
       const std::int32_t bucket = std::int32_t(buckets_->count);
-      fill(counts.of[0], counts.of[1]);
+      fill(counts);
       if (filled() >= least_) {
-        close(is_value);
+        close(is_value, is_value || knows_ties_);
       }
       counts.of[0] = bucket;
     }
@@ -315,12 +368,13 @@ private:
   std::int32_t filled() const {
     return buckets_->size[0][buckets_->count] + buckets_->size[1][buckets_->count];
   }
-  void fill(std::int32_t first, std::int32_t second) {
-    buckets_->size[0][buckets_->count] += first;
-    buckets_->size[1][buckets_->count] += second;
+  void fill(const Counts& counts) {
+    buckets_->size[0][buckets_->count] += counts.of[0];
+    buckets_->size[1][buckets_->count] += counts.of[1];
   }
-  void close(bool is_value) {
-    buckets_->is_value[buckets_->count++] = is_value;
+  void close(bool is_value, bool knows_ties) {
+    buckets_->is_value[buckets_->count] = is_value;
+    buckets_->knows_ties[buckets_->count++] = knows_ties;
     buckets_->size[0][buckets_->count] = buckets_->size[1][buckets_->count] = 0;
   }
 
@@ -329,28 +383,45 @@ private:
     for (std::int64_t i = 0; i < n_[0] + n_[1]; ++i) {
       of_point[i] = bucket_[bin_[i]];
     }
+    for (std::int32_t i = 0; i < numbers_; ++i) {
+      const std::int32_t bucket = counts_of_part_[part_[i]].of[0];
+      const bool is_tied = buckets_->is_value[bucket] != 0 || counts_of_number_[i].all() > 1;
+      part_[i] = 2 * bucket + is_tied;
+    }
     for (std::int64_t k = 0; k < heavy_points_; ++k) {
-      of_point[point_[k]] = std::uint16_t(part_counts_[part_[k]].of[0]);
+      const std::int32_t named = part_[number_of_[k]];
+      of_point[point_[k]] = std::uint16_t(named / 2);
+      tied_[point_[k]] |= named & 1;
     }
   }
 
   std::int64_t n_[2];
   std::int32_t least_;
+  std::uint8_t* tied_;
   KsBuckets* buckets_ = nullptr;
+  KsEvenScale scale_{};
   // By bin.
   std::int64_t bins_;
   std::int32_t* counts_[2];
-  std::int32_t* cuts_begin_; // -1: it is not heavy
+  std::int32_t* cuts_begin_; // where it is heavy
   std::int32_t* cuts_;
   std::uint16_t* bucket_;
   std::uint16_t* bin_; // by point
-  // The points of heavy bins, and where they are cut.
+  // The points of heavy bins and their numbers.
   std::int64_t heavy_points_ = 0;
   std::int32_t* point_;
-  std::int32_t* part_;
+  std::int32_t* number_of_;
+  bool knows_ties_ = false; // each number is listed once
+  int table_bits_;
+  std::int32_t* table_;
+  std::int32_t numbers_ = 0;
+  double* number_;
+  Counts* counts_of_number_;
+  std::int32_t* part_; // then twice the bucket, and one more where points share the number
+  // Where heavy bins are cut. The cuts and what lies between them are the parts.
   double* cut_;
-  std::int64_t half_ = 0;   // of the most cuts of a bin, a power of two
-  PartCounts* part_counts_; // then the bucket of the part
+  std::int64_t half_ = 0;  // of the most cuts of a bin, a power of two
+  Counts* counts_of_part_; // then the bucket
 };
 
 DRIFTWALK_LANES_END

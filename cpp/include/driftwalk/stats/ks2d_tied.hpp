@@ -11,14 +11,6 @@
 
 DRIFTWALK_LANES_BEGIN
 
-// Equal for equal numbers: -0.0 + 0.0 is +0.0.
-inline std::uint64_t ks_bits(double value) {
-  const double one_zero = value + 0.0;
-  std::uint64_t bits;
-  __builtin_memcpy(&bits, &one_zero, sizeof bits);
-  return bits;
-}
-
 // A point in the order of one axis, in 64 bits: the less is written all over memory the better.
 class KsRecord {
 public:
@@ -58,13 +50,11 @@ struct KsBucketed {
 
 class KsTiedCounter {
 public:
+  // `tied`: by point, 1 where it is known already.
   KsTiedCounter(const KsPlain& samples, const KsBucketed& columns, const KsBucketed& rows,
-                char* scratch)
-      : samples_(samples), n_(samples.n[0] + samples.n[1]),
-        tied_(ks_take<std::uint8_t>(scratch, n_)), before_(ks_take<std::int32_t>(scratch, n_)) {
-    for (std::int64_t i = 0; i < n_; ++i) {
-      tied_[i] = is_one_value(columns.buckets, i) | is_one_value(rows.buckets, i);
-    }
+                std::uint8_t* tied, char* scratch)
+      : samples_(samples), n_(samples.n[0] + samples.n[1]), tied_(tied),
+        before_(ks_take<std::int32_t>(scratch, n_)) {
     mark(columns, samples.x);
     mark(rows, samples.y);
   }
@@ -78,11 +68,6 @@ public:
   }
 
 private:
-  // A bucket of one value holds more than one point: it was too many for a bin.
-  static bool is_one_value(const KsBuckets& buckets, std::int64_t point) {
-    return buckets.is_value[buckets.of_point[point]] != 0;
-  }
-
   // Every point is compared with those before it in its bucket whose hashes begin with the same
   // bits, from the last back to the first that is equal.
   void mark(const KsBucketed& axis, const double* const values[2]) {
@@ -97,7 +82,7 @@ private:
     for (std::int64_t b = 0; b < buckets.count; ++b) {
       const std::int32_t begin = buckets.begin[b];
       const std::int32_t end = buckets.begin[b + 1];
-      if (buckets.is_value[b] != 0) {
+      if (buckets.knows_ties[b] != 0) {
         continue;
       }
       for (std::int32_t k = begin; k < end; ++k) {
