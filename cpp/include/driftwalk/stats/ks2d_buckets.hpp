@@ -388,10 +388,15 @@ private:
       const bool is_tied = buckets_->is_value[bucket] != 0 || counts_of_number_[i].all() > 1;
       part_[i] = 2 * bucket + is_tied;
     }
-    for (std::int64_t k = 0; k < heavy_points_; ++k) {
-      const std::int32_t named = part_[number_of_[k]];
-      of_point[point_[k]] = std::uint16_t(named / 2);
-      tied_[point_[k]] |= named & 1;
+    // What is stored byte by byte may lie anywhere, for all that the compiler knows.
+    const std::int32_t* const point = point_;
+    const std::int32_t* const number_of = number_of_;
+    const std::int32_t* const part = part_;
+    std::uint8_t* const tied = tied_;
+    for (std::int64_t k = 0, end = heavy_points_; k < end; ++k) {
+      const std::int32_t named = part[number_of[k]];
+      of_point[point[k]] = std::uint16_t(named / 2);
+      tied[point[k]] |= named & 1;
     }
   }
 

@@ -78,6 +78,8 @@ private:
       place = -1;
     }
     const KsBuckets& buckets = axis.buckets;
+    const KsRecord* const records = axis.records;
+    std::int32_t* const before = before_;
     const std::int64_t n1 = samples_.n[0];
     for (std::int64_t b = 0; b < buckets.count; ++b) {
       const std::int32_t begin = buckets.begin[b];
@@ -86,12 +88,13 @@ private:
         continue;
       }
       for (std::int32_t k = begin; k < end; ++k) {
-        const KsRecord own = axis.records[k];
+        const KsRecord own = records[k];
         std::int32_t& place = last[own.hash() >> shift];
-        before_[k] = place;
+        std::int32_t other = place;
+        before[k] = other;
         place = k;
-        for (std::int32_t other = before_[k]; other >= begin; other = before_[other]) {
-          const KsRecord met = axis.records[other];
+        for (; other >= begin; other = before[other]) {
+          const KsRecord met = records[other];
           if (own.hash() == met.hash() && own.value(values, n1) == met.value(values, n1)) {
             tied_[own.point()] = tied_[met.point()] = 1;
             break;
