@@ -269,13 +269,17 @@ private:
       const std::int32_t* const table = table_;
       const double* const number = number_;
       const int shift = 64 - table_bits_;
-      for (std::int64_t k = begin; k < end; ++k) {
+      std::int64_t k = begin;
+      for (; k < end && knows_ties_; ++k) {
         const double own = value[point_[k]];
         const std::int64_t slot = std::int64_t((ks_bits(own) * 0x9E3779B97F4A7C15u) >> shift);
         const std::int32_t found = table[slot];
         number_of_[k] = found >= 0 && number[found] == own ? found : find_number(own, slot);
       }
-      for (std::int64_t k = begin; k < end; ++k) {
+      for (; k < end; ++k) {
+        number_of_[k] = list_number(value[point_[k]]);
+      }
+      for (k = begin; k < end; ++k) {
         ++counts_of_number_[number_of_[k]].of[sample];
       }
     }
@@ -283,16 +287,17 @@ private:
   }
 
   std::int32_t find_number(double value, std::int64_t slot) {
-    if (knows_ties_) {
-      const std::int64_t slots = std::int64_t(1) << table_bits_;
-      for (; table_[slot] >= 0; slot = (slot + 1) & (slots - 1)) {
-        if (number_[table_[slot]] == value) {
-          return table_[slot];
-        }
+    const std::int64_t slots = std::int64_t(1) << table_bits_;
+    for (; table_[slot] >= 0; slot = (slot + 1) & (slots - 1)) {
+      if (number_[table_[slot]] == value) {
+        return table_[slot];
       }
-      table_[slot] = numbers_;
-      knows_ties_ = numbers_ < slots / 2;
     }
+    table_[slot] = numbers_;
+    knows_ties_ = numbers_ < slots / 2;
+    return list_number(value);
+  }
+  std::int32_t list_number(double value) {
     number_[numbers_] = value;
     counts_of_number_[numbers_] = {{0, 0}};
     return numbers_++;
