@@ -153,7 +153,7 @@ private:
     for (std::int64_t c = 0; c < columns_.count; ++c) {
       next_in_column[c] = columns_.begin[c];
     }
-    // One order after the other: both together meet more memory than the inner cache holds.
+    // One order after the other: both together touch more memory than the inner cache holds.
     std::uint32_t point = 0;
     for (int sample = 0; sample < 2; ++sample) {
       for (std::int64_t i = 0; i < samples_.n[sample]; ++i, ++point) {
@@ -464,7 +464,7 @@ private:
   KsBuckets columns_{};
   KsBuckets rows_{};
   std::uint8_t* tied_; // by point: 1 where it is known to share a coordinate
-  char* lists_;        // where the memory of the lists below begins; it serves before they are made
+  char* lists_;        // where the lists below begin; scratch until they are filled
   // In the order of columns.
   KsRecord* in_column_;
   Pair of_column_; // x and y, where the column is ready

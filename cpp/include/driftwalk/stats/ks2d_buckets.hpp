@@ -2,9 +2,9 @@
 //
 // A bucket holds the points of an interval of the axis, so the buckets are in order, and equal
 // numbers share one. The numbers are dealt to bins of an even scale, and neighbouring bins make a
-// bucket. A bin that holds too many is dealt again on a scale of its own, which resolves far
-// outliers and clusters of numbers that differ by rounding alone, and is a bucket where its numbers
-// are equal.
+// bucket. A bin that holds too many, because of far outliers or of numbers that differ by rounding
+// alone, is cut at some of its own numbers; one that many points have is a bucket by itself. Equal
+// numbers of such bins are looked for first: they are cut once, and known to be tied.
 #pragma once
 
 #include "driftwalk/config.hpp"
@@ -28,7 +28,7 @@ struct KsBuckets {
   std::uint16_t* of_point;  // (n) sample 2 after sample 1
   std::int32_t* size[2];    // by bucket: points of each sample
   std::uint8_t* is_value;   // by bucket: 1 where all its numbers are known to be equal
-  std::uint8_t* knows_ties; // by bucket: 1 where it is known which of its numbers are others' too
+  std::uint8_t* knows_ties; // by bucket: 1 where its tied points are known
   std::int32_t* begin;      // by bucket, and the end: its first point where they lie in order
   std::int64_t count;
 };
@@ -114,7 +114,7 @@ inline std::int32_t ks_sort_unique(double* values, std::int32_t n) {
 
 class KsBucketer {
 public:
-  // `tied`: by point, set to 1 where its number is known to be another's too.
+  // `tied`: by point, set to 1 where another point is known to have the same number.
   KsBucketer(const std::int64_t n[2], const KsBucketSizes& sizes, std::uint8_t* tied, char* scratch)
       : n_{n[0], n[1]}, least_(std::int32_t(sizes.points)), tied_(tied), bins_(sizes.bins) {
     const std::int64_t all = n[0] + n[1];
@@ -251,7 +251,7 @@ private:
     }
   }
 
-  // The points of heavy bins, and their numbers: each once, unless they are too many to tell.
+  // The points of heavy bins and their numbers, each once until the table is half full.
   void list_heavy(const double* const values[2]) {
     for (std::int64_t slot = 0; slot < std::int64_t(1) << table_bits_; ++slot) {
       table_[slot] = -1;
@@ -261,7 +261,8 @@ private:
     std::int32_t point = 0;
     for (int sample = 0; sample < 2; ++sample) {
       const std::int64_t begin = end;
-      const double* const value = values[sample] - point;
+      const std::int32_t first = point;
+      const double* const value = values[sample];
       for (std::int64_t i = 0; i < n_[sample]; ++i, ++point) {
         point_[end] = point;
         end += bucket_[bin_[point]];
@@ -271,13 +272,13 @@ private:
       const int shift = 64 - table_bits_;
       std::int64_t k = begin;
       for (; k < end && knows_ties_; ++k) {
-        const double own = value[point_[k]];
+        const double own = value[point_[k] - first];
         const std::int64_t slot = std::int64_t((ks_bits(own) * 0x9E3779B97F4A7C15u) >> shift);
         const std::int32_t found = table[slot];
         number_of_[k] = found >= 0 && number[found] == own ? found : find_number(own, slot);
       }
       for (; k < end; ++k) {
-        number_of_[k] = list_number(value[point_[k]]);
+        number_of_[k] = list_number(value[point_[k] - first]);
       }
       for (k = begin; k < end; ++k) {
         ++counts_of_number_[number_of_[k]].of[sample];
@@ -393,7 +394,7 @@ private:
       const bool is_tied = buckets_->is_value[bucket] != 0 || counts_of_number_[i].all() > 1;
       part_[i] = 2 * bucket + is_tied;
     }
-    // What is stored byte by byte may lie anywhere, for all that the compiler knows.
+    // Local, as a byte may be stored to any member for all that the compiler knows.
     const std::int32_t* const point = point_;
     const std::int32_t* const number_of = number_of_;
     const std::int32_t* const part = part_;
