@@ -94,7 +94,8 @@ public:
     if (!bucketer.cut(samples_.x, columns_) || !bucketer.cut(samples_.y, rows_)) {
       return false;
     }
-    order_points();
+    order_points(rows_, columns_, samples_.y, in_row_);
+    order_points(columns_, rows_, samples_.x, in_column_);
     weigh_columns();
     bound_all();
     if (!count_candidates()) {
@@ -143,29 +144,22 @@ private:
            weight[1] * Weight(buckets.size[1][bucket]);
   }
 
-  // Points of each column and of each row in a line; in it those of sample 1 come first.
-  void order_points() {
-    std::int32_t* const next = ks_take_later<std::int32_t>(rows_.count + columns_.count);
-    std::int32_t* const next_in_column = next + rows_.count;
-    for (std::int64_t r = 0; r < rows_.count; ++r) {
-      next[r] = rows_.begin[r];
+  // The points of each bucket in a line; in it those of sample 1 come first.
+  void order_points(const KsBuckets& axis, const KsBuckets& other, const double* const values[2],
+                    KsRecord* records) {
+    constexpr std::int64_t ahead = 32;
+    std::int32_t* const next = ks_take_later<std::int32_t>(axis.count);
+    for (std::int64_t b = 0; b < axis.count; ++b) {
+      next[b] = axis.begin[b];
     }
-    for (std::int64_t c = 0; c < columns_.count; ++c) {
-      next_in_column[c] = columns_.begin[c];
-    }
-    // One order after the other: both together touch more memory than the inner cache holds.
     std::uint32_t point = 0;
     for (int sample = 0; sample < 2; ++sample) {
       for (std::int64_t i = 0; i < samples_.n[sample]; ++i, ++point) {
-        in_row_[next[rows_.of_point[point]]++] =
-            KsRecord(point, columns_.of_point[point], samples_.y[sample][i]);
-      }
-    }
-    point = 0;
-    for (int sample = 0; sample < 2; ++sample) {
-      for (std::int64_t i = 0; i < samples_.n[sample]; ++i, ++point) {
-        in_column_[next_in_column[columns_.of_point[point]]++] =
-            KsRecord(point, rows_.of_point[point], samples_.x[sample][i]);
+        // Where a later point goes was last written to long ago.
+        const std::int64_t later = point + ahead < n_ ? point + ahead : point;
+        __builtin_prefetch(records + next[axis.of_point[later]], 1);
+        records[next[axis.of_point[point]]++] =
+            KsRecord(point, other.of_point[point], values[sample][i]);
       }
     }
   }
