@@ -76,6 +76,8 @@ public:
         at_(static_cast<char*>(samples.scratch)) {
     take_buckets(columns_);
     take_buckets(rows_);
+    tied_ = ks_take<std::uint8_t>(at_, n_);
+    lists_ = at_;
     in_column_ = ks_take<KsRecord>(at_, n_);
     in_row_ = ks_take<KsRecord>(at_, n_);
     bound_ = ks_take<Weight>(at_, n_);
@@ -85,15 +87,15 @@ public:
   }
 
   bool run(KsFound found[2], std::int64_t& tied) {
-    // The lists serve before the points are in order.
-    const KsNumbers lists[2] = {
-        {of_column_.first, reinterpret_cast<std::int32_t*>(of_column_.second)},
-        {of_row_.first, reinterpret_cast<std::int32_t*>(of_row_.second)}};
-    KsBucketer bucketer(samples_.n, samples_.buckets, at_, lists);
+    for (std::int64_t i = 0; i < n_; ++i) {
+      tied_[i] = 0;
+    }
+    KsBucketer bucketer(samples_.n, samples_.buckets, tied_, lists_);
     if (!bucketer.cut(samples_.x, columns_) || !bucketer.cut(samples_.y, rows_)) {
       return false;
     }
-    order_points();
+    order_points(rows_, columns_, samples_.y, in_row_);
+    order_points(columns_, rows_, samples_.x, in_column_);
     weigh_columns();
     bound_all();
     if (!count_candidates()) {
@@ -102,9 +104,10 @@ public:
     for (int sample = 0; sample < 2; ++sample) {
       found[sample] = found_[sample];
     }
-    tied = samples_.counts_tied
-               ? KsTiedCounter(samples_, {columns_, in_column_}, {rows_, in_row_}, at_).count()
-               : 0;
+    tied =
+        samples_.counts_tied
+            ? KsTiedCounter(samples_, {columns_, in_column_}, {rows_, in_row_}, tied_, at_).count()
+            : 0;
     return true;
   }
 
@@ -122,9 +125,10 @@ private:
   void take_buckets(KsBuckets& buckets) {
     const std::int64_t most = samples_.buckets.most;
     buckets.of_point = ks_take<std::uint16_t>(at_, n_);
-    buckets.size[0] = ks_take<std::int32_t>(at_, most);
-    buckets.size[1] = ks_take<std::int32_t>(at_, most);
+    buckets.size[0] = ks_take<std::int32_t>(at_, most + 1);
+    buckets.size[1] = ks_take<std::int32_t>(at_, most + 1);
     buckets.is_value = ks_take<std::uint8_t>(at_, most);
+    buckets.knows_ties = ks_take<std::uint8_t>(at_, most);
     buckets.begin = ks_take<std::int32_t>(at_, most + 1);
   }
 
@@ -140,23 +144,22 @@ private:
            weight[1] * Weight(buckets.size[1][bucket]);
   }
 
-  // Points of each column and of each row in a line; in it those of sample 1 come first.
-  void order_points() {
-    std::int32_t* const next = ks_take_later<std::int32_t>(rows_.count + columns_.count);
-    std::int32_t* const next_in_column = next + rows_.count;
-    for (std::int64_t r = 0; r < rows_.count; ++r) {
-      next[r] = rows_.begin[r];
-    }
-    for (std::int64_t c = 0; c < columns_.count; ++c) {
-      next_in_column[c] = columns_.begin[c];
+  // The points of each bucket in a line; in it those of sample 1 come first.
+  void order_points(const KsBuckets& axis, const KsBuckets& other, const double* const values[2],
+                    KsRecord* records) {
+    constexpr std::int64_t ahead = 32;
+    std::int32_t* const next = ks_take_later<std::int32_t>(axis.count);
+    for (std::int64_t b = 0; b < axis.count; ++b) {
+      next[b] = axis.begin[b];
     }
     std::uint32_t point = 0;
     for (int sample = 0; sample < 2; ++sample) {
       for (std::int64_t i = 0; i < samples_.n[sample]; ++i, ++point) {
-        const std::uint16_t column = columns_.of_point[point];
-        const std::uint16_t row = rows_.of_point[point];
-        in_row_[next[row]++] = KsRecord(point, column, samples_.y[sample][i]);
-        in_column_[next_in_column[column]++] = KsRecord(point, row, samples_.x[sample][i]);
+        // Where a later point goes was last written to long ago.
+        const std::int64_t later = point + ahead < n_ ? point + ahead : point;
+        __builtin_prefetch(records + next[axis.of_point[later]], 1);
+        records[next[axis.of_point[point]]++] =
+            KsRecord(point, other.of_point[point], values[sample][i]);
       }
     }
   }
@@ -454,6 +457,8 @@ private:
   char* at_; // where free scratch begins
   KsBuckets columns_{};
   KsBuckets rows_{};
+  std::uint8_t* tied_; // by point: 1 where it is known to share a coordinate
+  char* lists_;        // where the lists below begin; scratch until they are filled
   // In the order of columns.
   KsRecord* in_column_;
   Pair of_column_; // x and y, where the column is ready

@@ -2,12 +2,13 @@
 //
 // A bucket holds the points of an interval of the axis, so the buckets are in order, and equal
 // numbers share one. The numbers are dealt to bins of an even scale, and neighbouring bins make a
-// bucket. A bin that holds too many is dealt again on a scale of its own, which resolves far
-// outliers and clusters of numbers that differ by rounding alone, and is a bucket where its numbers
-// are equal.
+// bucket. A bin that holds too many, because of far outliers or of numbers that differ by rounding
+// alone, is cut at some of its own numbers; one that many points have is a bucket by itself. Equal
+// numbers of such bins are looked for first: they are cut once, and known to be tied.
 #pragma once
 
 #include "driftwalk/config.hpp"
+#include "driftwalk/stats/ks2d_kernel.hpp"
 #include "driftwalk/stats/ks2d_sweep.hpp"
 
 #include <cstdint>
@@ -22,21 +23,14 @@ inline T* ks_take(char*& at, std::int64_t count) {
   return begin;
 }
 
-inline constexpr std::uint16_t ks_no_bucket = 0xFFFF;
-
 // The buckets of one axis.
 struct KsBuckets {
-  std::uint16_t* of_point; // (n) sample 2 after sample 1
-  std::int32_t* size[2];   // by bucket: points of each sample
-  std::uint8_t* is_value;  // by bucket: 1 where all its numbers are known to be equal
-  std::int32_t* begin;     // by bucket, and the end: its first point where they lie in order
+  std::uint16_t* of_point;  // (n) sample 2 after sample 1
+  std::int32_t* size[2];    // by bucket: points of each sample
+  std::uint8_t* is_value;   // by bucket: 1 where all its numbers are known to be equal
+  std::uint8_t* knows_ties; // by bucket: 1 where its tied points are known
+  std::int32_t* begin;      // by bucket, and the end: its first point where they lie in order
   std::int64_t count;
-};
-
-// Numbers with the points that they belong to.
-struct KsNumbers {
-  double* value;
-  std::int32_t* point;
 };
 
 struct KsEvenScale {
@@ -56,33 +50,34 @@ struct KsRange {
   double lowest;
   double highest;
 
-  // Several at a time: each waits for its last comparison.
   void widen(const double* values, std::int64_t n) {
-    constexpr int lanes = 16;
-    double low[lanes];
-    double high[lanes];
-    for (int lane = 0; lane < lanes; ++lane) {
-      low[lane] = lowest;
-      high[lane] = highest;
-    }
+    using Vector = KsVector<double>;
+    typename Vector::Type low = Vector::Type{} + lowest;
+    typename Vector::Type high = Vector::Type{} + highest;
     std::int64_t i = 0;
-    for (; i + lanes <= n; i += lanes) {
-      for (int lane = 0; lane < lanes; ++lane) {
-        const double value = values[i + lane];
-        low[lane] = value < low[lane] ? value : low[lane];
-        high[lane] = value > high[lane] ? value : high[lane];
-      }
+    for (; i + Vector::lanes <= n; i += Vector::lanes) {
+      const typename Vector::Type value = Vector::load(values + i);
+      low = value < low ? value : low;
+      high = value > high ? value : high;
     }
-    for (; i < n; ++i) {
-      low[0] = values[i] < low[0] ? values[i] : low[0];
-      high[0] = values[i] > high[0] ? values[i] : high[0];
-    }
-    for (int lane = 0; lane < lanes; ++lane) {
+    for (int lane = 0; lane < Vector::lanes; ++lane) {
       lowest = low[lane] < lowest ? low[lane] : lowest;
       highest = high[lane] > highest ? high[lane] : highest;
     }
+    for (; i < n; ++i) {
+      lowest = values[i] < lowest ? values[i] : lowest;
+      highest = values[i] > highest ? values[i] : highest;
+    }
   }
 };
+
+// Equal for equal numbers: -0.0 + 0.0 is +0.0.
+inline std::uint64_t ks_bits(double value) {
+  const double one_zero = value + 0.0;
+  std::uint64_t bits;
+  __builtin_memcpy(&bits, &one_zero, sizeof bits);
+  return bits;
+}
 
 inline int ks_bit_width(std::int64_t n) {
   int bits = 0;
@@ -92,230 +87,352 @@ inline int ks_bit_width(std::int64_t n) {
   return bits;
 }
 
+// Numbers in order, equal ones once; returns how many are left.
+inline std::int32_t ks_sort_unique(double* values, std::int32_t n) {
+  std::int32_t gap = 1;
+  while (gap < n / 3) {
+    gap = 3 * gap + 1;
+  }
+  for (; gap > 0; gap /= 3) {
+    for (std::int32_t i = gap; i < n; ++i) {
+      const double value = values[i];
+      std::int32_t j = i;
+      for (; j >= gap && values[j - gap] > value; j -= gap) {
+        values[j] = values[j - gap];
+      }
+      values[j] = value;
+    }
+  }
+  std::int32_t kept = 0;
+  for (std::int32_t i = 0; i < n; ++i) {
+    const double value = values[i];
+    kept += kept == 0 || values[kept - 1] != value;
+    values[kept - 1] = value;
+  }
+  return kept;
+}
+
 class KsBucketer {
 public:
-  // `lists`: room for n + 1 numbers in each.
-  KsBucketer(const std::int64_t n[2], const KsBucketSizes& sizes, char* scratch,
-             const KsNumbers lists[2])
-      : n_{n[0], n[1]}, least_(std::int32_t(sizes.points)), lists_{lists[0], lists[1]} {
-    bins_ = sizes.bins;
-    counts_ = ks_take<std::int32_t>(scratch, bins_);
-    ends_ = ks_take<End>(scratch, bins_);
+  // `tied`: by point, set to 1 where another point is known to have the same number.
+  KsBucketer(const std::int64_t n[2], const KsBucketSizes& sizes, std::uint8_t* tied, char* scratch)
+      : n_{n[0], n[1]}, least_(std::int32_t(sizes.points)), tied_(tied), bins_(sizes.bins) {
+    const std::int64_t all = n[0] + n[1];
+    counts_[0] = ks_take<std::int32_t>(scratch, bins_);
+    counts_[1] = ks_take<std::int32_t>(scratch, bins_);
+    cuts_begin_ = ks_take<std::int32_t>(scratch, bins_);
+    cuts_ = ks_take<std::int32_t>(scratch, bins_);
     bucket_ = ks_take<std::uint16_t>(scratch, bins_);
-    bin_ = ks_take<std::uint16_t>(scratch, n[0] + n[1]);
+    bin_ = ks_take<std::uint16_t>(scratch, all);
+    point_ = ks_take<std::int32_t>(scratch, all);
+    number_of_ = ks_take<std::int32_t>(scratch, all);
+    table_bits_ = ks_bit_width(all) - 2;
+    table_ = ks_take<std::int32_t>(scratch, std::int64_t(1) << table_bits_);
+    number_ = ks_take<double>(scratch, all);
+    counts_of_number_ = ks_take<Counts>(scratch, all);
+    part_ = ks_take<std::int32_t>(scratch, all);
+    cut_ = ks_take<double>(scratch, all);
+    counts_of_part_ = ks_take<Counts>(scratch, all);
   }
 
-  // False where the numbers crowd too much for even scales.
+  // False where the range of the numbers is too large or too small for an even scale.
   bool cut(const double* const values[2], KsBuckets& buckets) {
     buckets_ = &buckets;
     buckets.count = 0;
+    buckets.size[0][0] = buckets.size[1][0] = 0;
     KsRange range{values[0][0], values[0][0]};
     range.widen(values[0], n_[0]);
     range.widen(values[1], n_[1]);
-    const std::int64_t n = n_[0] + n_[1];
     if (range.lowest == range.highest) {
-      for (std::int64_t i = 0; i < n; ++i) {
-        bin_[i] = 0;
+      for (std::int64_t i = 0; i < n_[0] + n_[1]; ++i) {
+        buckets.of_point[i] = 0;
+        tied_[i] = 1;
       }
-      bucket_[0] = 0;
-      buckets.is_value[0] = 1;
-      buckets.count = 1;
-      name_and_count();
-      return true;
+      fill({{std::int32_t(n_[0]), std::int32_t(n_[1])}});
+      close(true, true);
+    } else {
+      if (!scale_.set(range.lowest, range.highest, bins_)) {
+        return false;
+      }
+      deal(values);
+      heavy_points_ = numbers_ = 0;
+      if (is_crowded()) {
+        list_heavy(values);
+        place_cuts(values);
+        find_parts();
+      }
+      join_bins();
+      name();
     }
-    KsEvenScale scale;
-    if (!scale.set(range.lowest, range.highest, bins_)) {
-      return false;
+    std::int32_t begin = 0;
+    for (std::int64_t b = 0; b < buckets.count; ++b) {
+      buckets.begin[b] = begin;
+      begin += buckets.size[0][b] + buckets.size[1][b];
     }
-    deal(values, scale);
-    if (is_crowded()) {
-      list_heavy(values);
-    }
-    if (!join_bins()) {
-      return false;
-    }
-    name_and_count();
+    buckets.begin[buckets.count] = begin;
     return true;
   }
 
 private:
-  // Where the next number of a bin goes in the list.
-  struct End {
-    std::int32_t at;
-    std::int32_t step;
+  struct Counts {
+    std::int32_t of[2];
+    std::int32_t all() const { return of[0] + of[1]; }
   };
 
-  void deal(const double* const values[2], const KsEvenScale& scale) {
-    for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      counts_[bin] = 0;
-    }
+  void deal(const double* const values[2]) {
     std::uint16_t* bin = bin_;
     for (int sample = 0; sample < 2; ++sample) {
+      std::int32_t* const counts = counts_[sample];
+      for (std::int64_t b = 0; b < bins_; ++b) {
+        counts[b] = 0;
+      }
       const double* const value = values[sample];
       for (std::int64_t i = 0; i < n_[sample]; ++i) {
-        bin[i] = std::uint16_t(scale.bin(value[i]));
-      }
-      bin += n_[sample];
-    }
-    for (std::int64_t i = 0; i < n_[0] + n_[1]; ++i) {
-      ++counts_[bin_[i]];
-    }
-  }
-
-  bool is_heavy(std::int64_t bin) const { return counts_[bin] > 2 * least_; }
-  bool is_crowded() const {
-    bool heavy = false;
-    for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      heavy |= is_heavy(bin);
-    }
-    return heavy;
-  }
-
-  // The numbers of heavy bins, bin by bin; all others are written behind the end.
-  void list_heavy(const double* const values[2]) {
-    const std::int32_t trash = std::int32_t(n_[0] + n_[1]);
-    std::int32_t end = 0;
-    for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      const bool heavy = is_heavy(bin);
-      ends_[bin] = {heavy ? end : trash, heavy};
-      end += heavy ? counts_[bin] : 0;
-    }
-    std::int32_t point = 0;
-    for (int sample = 0; sample < 2; ++sample) {
-      for (std::int64_t i = 0; i < n_[sample]; ++i, ++point) {
-        End& to = ends_[bin_[point]];
-        lists_[0].value[to.at] = values[sample][i];
-        lists_[0].point[to.at] = point;
-        to.at += to.step;
-      }
-    }
-  }
-
-  // Every bin gets its bucket.
-  bool join_bins() {
-    std::int32_t filled = 0;
-    for (std::int64_t bin = 0; bin < bins_; ++bin) {
-      if (is_heavy(bin)) {
-        close(filled);
-        bucket_[bin] = ks_no_bucket;
-        if (!deal_again(0, ends_[bin].at - counts_[bin], counts_[bin], 0)) {
-          return false;
-        }
-      } else {
-        bucket_[bin] = std::uint16_t(buckets_->count);
-        fill(counts_[bin], filled);
-      }
-    }
-    close(filled);
-    return buckets_->count < ks_no_bucket;
-  }
-
-  void fill(std::int32_t points, std::int32_t& filled) {
-    filled += points;
-    if (filled >= least_) {
-      close(filled);
-    }
-  }
-  void close(std::int32_t& filled) {
-    if (filled > 0) {
-      buckets_->is_value[buckets_->count++] = 0;
-      filled = 0;
-    }
-  }
-  void put_all(const KsNumbers& numbers, std::int64_t begin, std::int64_t n) {
-    for (std::int64_t i = begin; i < begin + n; ++i) {
-      buckets_->of_point[numbers.point[i]] = std::uint16_t(buckets_->count);
-    }
-  }
-
-  // Cut a part of a list on a scale of its own; the other list takes the numbers in order of bins.
-  bool deal_again(int list, std::int64_t begin, std::int64_t n, int depth) {
-    constexpr int most_depth = 4;
-    constexpr int most_bits = 10;
-    const KsNumbers from = lists_[list];
-    const KsNumbers to = lists_[1 - list];
-    KsRange range{from.value[begin], from.value[begin]};
-    range.widen(from.value + begin, n);
-    if (range.lowest == range.highest) {
-      put_all(from, begin, n);
-      buckets_->is_value[buckets_->count++] = 1;
-      return true;
-    }
-    int bits = ks_bit_width(n) - 2;
-    bits = bits < 4 ? 4 : bits > most_bits ? most_bits : bits;
-    KsEvenScale scale;
-    if (depth == most_depth || !scale.set(range.lowest, range.highest, std::int64_t(1) << bits)) {
-      return false;
-    }
-    std::int32_t ends[1 << most_bits] = {};
-    for (std::int64_t i = begin; i < begin + n; ++i) {
-      ++ends[scale.bin(from.value[i])];
-    }
-    std::int32_t sum = std::int32_t(begin);
-    for (std::int64_t bin = 0; bin < std::int64_t(1) << bits; ++bin) {
-      const std::int32_t size = ends[bin];
-      ends[bin] = sum;
-      sum += size;
-    }
-    for (std::int64_t i = begin; i < begin + n; ++i) {
-      const std::int32_t at = ends[scale.bin(from.value[i])]++;
-      to.value[at] = from.value[i];
-      to.point[at] = from.point[i];
-    }
-    std::int32_t filled = 0;
-    std::int64_t done = begin;
-    for (std::int64_t bin = 0; bin < std::int64_t(1) << bits; ++bin) {
-      const std::int32_t size = std::int32_t(ends[bin] - done);
-      if (size > 2 * least_) {
-        close(filled);
-        if (!deal_again(1 - list, done, size, depth + 1)) {
-          return false;
-        }
-      } else {
-        put_all(to, done, size);
-        fill(size, filled);
-      }
-      done = ends[bin];
-    }
-    close(filled);
-    return buckets_->count < ks_no_bucket;
-  }
-
-  void name_and_count() {
-    std::uint16_t* of_point = buckets_->of_point;
-    const std::uint16_t* bin = bin_;
-    for (int sample = 0; sample < 2; ++sample) {
-      std::int32_t* const size = buckets_->size[sample];
-      for (std::int64_t b = 0; b < buckets_->count; ++b) {
-        size[b] = 0;
+        bin[i] = std::uint16_t(scale_.bin(value[i]));
       }
       for (std::int64_t i = 0; i < n_[sample]; ++i) {
-        const std::uint16_t bucket = bucket_[bin[i]];
-        // Points that were dealt again have theirs already.
-        of_point[i] = bucket == ks_no_bucket ? of_point[i] : bucket;
-        ++size[of_point[i]];
+        ++counts[bin[i]];
       }
-      of_point += n_[sample];
       bin += n_[sample];
     }
-    std::int32_t begin = 0;
-    for (std::int64_t b = 0; b < buckets_->count; ++b) {
-      buckets_->begin[b] = begin;
-      begin += buckets_->size[0][b] + buckets_->size[1][b];
+  }
+
+  bool is_heavy(std::int64_t bin) const { return counts_[0][bin] + counts_[1][bin] > 3 * least_; }
+  bool is_crowded() {
+    bool any = false;
+    for (std::int64_t bin = 0; bin < bins_; ++bin) {
+      bucket_[bin] = is_heavy(bin); // until the bins have buckets
+      any |= is_heavy(bin);
     }
-    buckets_->begin[buckets_->count] = begin;
+    return any;
+  }
+
+  // Some numbers of every heavy bin, in order and each once; infinity comes behind them.
+  void place_cuts(const double* const values[2]) {
+    const std::int64_t n = n_[0] + n_[1];
+    const std::int64_t step = least_;
+    for (std::int64_t bin = 0; bin < bins_; ++bin) {
+      cuts_[bin] = 0;
+    }
+    for (std::int64_t i = 0; i < n; i += step) {
+      ++cuts_[bin_[i]];
+    }
+    std::int32_t end = 1;
+    for (std::int64_t bin = 0; bin < bins_; ++bin) {
+      cuts_begin_[bin] = end;
+      end += is_heavy(bin) ? cuts_[bin] + 1 : 0;
+      cuts_[bin] = 0;
+    }
+    for (std::int64_t i = 0; i < n; i += step) {
+      const std::int64_t bin = bin_[i];
+      if (is_heavy(bin)) {
+        cut_[cuts_begin_[bin] + cuts_[bin]++] = i < n_[0] ? values[0][i] : values[1][i - n_[0]];
+      }
+    }
+    std::int32_t most = 0;
+    for (std::int64_t bin = 0; bin < bins_; ++bin) {
+      if (is_heavy(bin)) {
+        double* const cut = cut_ + cuts_begin_[bin];
+        const std::int32_t all = cuts_[bin];
+        cuts_[bin] = ks_sort_unique(cut, all);
+        for (std::int32_t i = cuts_[bin]; i <= all; ++i) {
+          cut[i] = __builtin_inf();
+        }
+        most = cuts_[bin] > most ? cuts_[bin] : most;
+      }
+    }
+    half_ = (std::int64_t(1) << ks_bit_width(most)) / 2;
+    cut_[0] = 0;
+    for (std::int64_t i = 0; i < 2 * half_; ++i) {
+      cut_[end + i] = __builtin_inf();
+    }
+    for (std::int32_t part = 0; part < 2 * end; ++part) {
+      counts_of_part_[part] = {{0, 0}};
+    }
+  }
+
+  // The points of heavy bins and their numbers, each once until the table is half full.
+  void list_heavy(const double* const values[2]) {
+    for (std::int64_t slot = 0; slot < std::int64_t(1) << table_bits_; ++slot) {
+      table_[slot] = -1;
+    }
+    knows_ties_ = true;
+    std::int64_t end = 0;
+    std::int32_t point = 0;
+    for (int sample = 0; sample < 2; ++sample) {
+      const std::int64_t begin = end;
+      const std::int32_t first = point;
+      const double* const value = values[sample];
+      for (std::int64_t i = 0; i < n_[sample]; ++i, ++point) {
+        point_[end] = point;
+        end += bucket_[bin_[point]];
+      }
+      const std::int32_t* const table = table_;
+      const double* const number = number_;
+      const int shift = 64 - table_bits_;
+      std::int64_t k = begin;
+      for (; k < end && knows_ties_; ++k) {
+        const double own = value[point_[k] - first];
+        const std::int64_t slot = std::int64_t((ks_bits(own) * 0x9E3779B97F4A7C15u) >> shift);
+        const std::int32_t found = table[slot];
+        number_of_[k] = found >= 0 && number[found] == own ? found : find_number(own, slot);
+      }
+      for (; k < end; ++k) {
+        number_of_[k] = list_number(value[point_[k] - first]);
+      }
+      for (k = begin; k < end; ++k) {
+        ++counts_of_number_[number_of_[k]].of[sample];
+      }
+    }
+    heavy_points_ = end;
+  }
+
+  std::int32_t find_number(double value, std::int64_t slot) {
+    const std::int64_t slots = std::int64_t(1) << table_bits_;
+    for (; table_[slot] >= 0; slot = (slot + 1) & (slots - 1)) {
+      if (number_[table_[slot]] == value) {
+        return table_[slot];
+      }
+    }
+    table_[slot] = numbers_;
+    knows_ties_ = numbers_ < slots / 2;
+    return list_number(value);
+  }
+  std::int32_t list_number(double value) {
+    number_[numbers_] = value;
+    counts_of_number_[numbers_] = {{0, 0}};
+    return numbers_++;
+  }
+
+  // The part of every number of a heavy bin: twice the number of smaller cuts, and one more where
+  // it is a cut. Many searches at a time: each waits for its last comparison.
+  void find_parts() {
+    constexpr std::int32_t block = 256;
+    std::int64_t at[block];
+    const double* const cut = cut_;
+    for (std::int32_t begin = 0; begin < numbers_; begin += block) {
+      const std::int32_t size = numbers_ - begin < block ? numbers_ - begin : block;
+      const double* const own = number_ + begin;
+      for (std::int32_t i = 0; i < size; ++i) {
+        at[i] = cuts_begin_[scale_.bin(own[i])];
+      }
+      for (std::int64_t half = half_; half > 0; half /= 2) {
+        for (std::int32_t i = 0; i < size; ++i) {
+          at[i] += half & -std::int64_t(cut[at[i] + half - 1] < own[i]);
+        }
+      }
+      for (std::int32_t i = 0; i < size; ++i) {
+        const std::int32_t part = std::int32_t(2 * at[i]) + (cut[at[i]] == own[i]);
+        part_[begin + i] = part;
+        counts_of_part_[part].of[0] += counts_of_number_[begin + i].of[0];
+        counts_of_part_[part].of[1] += counts_of_number_[begin + i].of[1];
+      }
+    }
+  }
+
+  // Every bin and every part of a heavy one gets its bucket.
+  void join_bins() {
+    bool was_heavy = false;
+    for (std::int64_t bin = 0; bin < bins_; ++bin) {
+      const bool heavy = is_heavy(bin);
+      if (heavy != was_heavy && filled() > 0) {
+        close(false, was_heavy && knows_ties_);
+      }
+      was_heavy = heavy;
+      if (heavy) {
+        join_parts(2 * cuts_begin_[bin], 2 * cuts_[bin] + 1);
+      } else {
+        bucket_[bin] = std::uint16_t(buckets_->count);
+        fill({{counts_[0][bin], counts_[1][bin]}});
+        if (filled() >= least_) {
+          close(false, false);
+        }
+      }
+    }
+    if (filled() > 0) {
+      close(false, was_heavy && knows_ties_);
+    }
+  }
+
+  void join_parts(std::int32_t begin, std::int32_t count) {
+    for (std::int32_t part = begin; part < begin + count; ++part) {
+      Counts& counts = counts_of_part_[part];
+      const bool is_value = part % 2 != 0 && counts.all() > least_;
+      if ((is_value || counts.all() > 2 * least_) && filled() > 0) {
+        close(false, knows_ties_);
+      }
+      const std::int32_t bucket = std::int32_t(buckets_->count);
+      fill(counts);
+      if (filled() >= least_) {
+        close(is_value, is_value || knows_ties_);
+      }
+      counts.of[0] = bucket;
+    }
+  }
+
+  // The bucket that is being filled comes after those that are counted.
+  std::int32_t filled() const {
+    return buckets_->size[0][buckets_->count] + buckets_->size[1][buckets_->count];
+  }
+  void fill(const Counts& counts) {
+    buckets_->size[0][buckets_->count] += counts.of[0];
+    buckets_->size[1][buckets_->count] += counts.of[1];
+  }
+  void close(bool is_value, bool knows_ties) {
+    buckets_->is_value[buckets_->count] = is_value;
+    buckets_->knows_ties[buckets_->count++] = knows_ties;
+    buckets_->size[0][buckets_->count] = buckets_->size[1][buckets_->count] = 0;
+  }
+
+  void name() {
+    std::uint16_t* const of_point = buckets_->of_point;
+    for (std::int64_t i = 0; i < n_[0] + n_[1]; ++i) {
+      of_point[i] = bucket_[bin_[i]];
+    }
+    for (std::int32_t i = 0; i < numbers_; ++i) {
+      const std::int32_t bucket = counts_of_part_[part_[i]].of[0];
+      const bool is_tied = buckets_->is_value[bucket] != 0 || counts_of_number_[i].all() > 1;
+      part_[i] = 2 * bucket + is_tied;
+    }
+    // Local, as a byte may be stored to any member for all that the compiler knows.
+    const std::int32_t* const point = point_;
+    const std::int32_t* const number_of = number_of_;
+    const std::int32_t* const part = part_;
+    std::uint8_t* const tied = tied_;
+    for (std::int64_t k = 0, end = heavy_points_; k < end; ++k) {
+      const std::int32_t named = part[number_of[k]];
+      of_point[point[k]] = std::uint16_t(named / 2);
+      tied[point[k]] |= named & 1;
+    }
   }
 
   std::int64_t n_[2];
   std::int32_t least_;
-  KsNumbers lists_[2];
+  std::uint8_t* tied_;
   KsBuckets* buckets_ = nullptr;
-  std::int64_t bins_;
+  KsEvenScale scale_{};
   // By bin.
-  std::int32_t* counts_;
-  End* ends_;
+  std::int64_t bins_;
+  std::int32_t* counts_[2];
+  std::int32_t* cuts_begin_; // where it is heavy
+  std::int32_t* cuts_;
   std::uint16_t* bucket_;
   std::uint16_t* bin_; // by point
+  // The points of heavy bins and their numbers.
+  std::int64_t heavy_points_ = 0;
+  std::int32_t* point_;
+  std::int32_t* number_of_;
+  bool knows_ties_ = false; // each number is listed once
+  int table_bits_;
+  std::int32_t* table_;
+  std::int32_t numbers_ = 0;
+  double* number_;
+  Counts* counts_of_number_;
+  std::int32_t* part_; // then twice the bucket, and one more where points share the number
+  // Where heavy bins are cut. The cuts and what lies between them are the parts.
+  double* cut_;
+  std::int64_t half_ = 0;  // of the most cuts of a bin, a power of two
+  Counts* counts_of_part_; // then the bucket
 };
 
 DRIFTWALK_LANES_END

@@ -68,7 +68,7 @@ constexpr KsBucketSizes ks_bucket_sizes(std::int64_t n) {
   while (bins * points < 4 * n && bins < 1 << 16) {
     bins *= 2;
   }
-  return {points, bins, 5 * n / (2 * points) + 64};
+  return {points, bins, 11 * n / (4 * points) + 64};
 }
 
 // The same statistic without an order, of two samples as they come; see KsBounded.
