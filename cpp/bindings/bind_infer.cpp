@@ -243,7 +243,7 @@ void register_infer(nb::module_& module) {
              double water_acceleration, double water_spin, double drag_power, double drag_speed,
              double time_noise, double force_memory, std::optional<In<double, 2>> panels,
              std::optional<In<double, 2>> moment_points, double mass_by_inertia, int symmetry,
-             bool round) {
+             bool round, const std::optional<In<double, 2>>& velocity_prior) {
             const std::size_t n = time.size();
             if (x.size() != n || y.size() != n || theta.size() != n || omega.size() != n ||
                 excluded.size() != n || (strength && strength->shape(1) != n)) {
@@ -253,10 +253,14 @@ void register_infer(nb::module_& module) {
             if (strength && 2 * strength->shape(0) != coefficients.shape(0)) {
               throw std::invalid_argument("strength must have shape (layers, n)");
             }
+            if (velocity_prior &&
+                (velocity_prior->shape(0) != n || velocity_prior->shape(1) != 6)) {
+              throw std::invalid_argument("velocity_prior must have shape (n, 6)");
+            }
             new (self) InnovationsFilter(
                 {time.data(), x.data(), y.data(), theta.data(), omega.data(),
                  strength ? strength->data() : nullptr, excluded.data(),
-                 static_cast<std::int64_t>(n)},
+                 static_cast<std::int64_t>(n), velocity_prior ? velocity_prior->data() : nullptr},
                 drag_model(
                     side, mass, depth, strips, water_density, origin_x, origin_y, spacing, columns,
                     rows, coefficients, drag_coefficient, orientation,
@@ -276,7 +280,7 @@ void register_infer(nb::module_& module) {
           "linear"_a = 0.0, "water_acceleration"_a = 0.0, "water_spin"_a = 0.0,
           "drag_power"_a = 2.0, "drag_speed"_a = 0.03, "time_noise"_a = 0.0, "force_memory"_a = 0.0,
           "panels"_a = nb::none(), "moment_points"_a = nb::none(), "mass_by_inertia"_a = 0.0,
-          "symmetry"_a = 4, "round"_a = false)
+          "symmetry"_a = 4, "round"_a = false, "velocity_prior"_a = nb::none())
       .def_prop_ro("samples", &InnovationsFilter::samples)
       .def_prop_ro("remaining", &InnovationsFilter::remaining)
       .def_prop_ro("parameters", &InnovationsFilter::parameters)

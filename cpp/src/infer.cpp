@@ -40,6 +40,10 @@ void check(const Track& track, Angle angle, int layers) {
   require(track.strength != nullptr || layers == 1, "several layers need their strengths");
   require(track.strength == nullptr || all_finite(track.strength, layers * track.samples),
           "the strength of the flow must be finite");
+  for (std::int64_t k = 0; track.velocity_prior != nullptr && k < 6 * track.samples; ++k) {
+    require(!std::isinf(track.velocity_prior[k]) && (k % 6 < 3 || !(track.velocity_prior[k] < 0)),
+            "the prior of the velocity must be finite, its deviations not negative, or NaN");
+  }
   if (angle == Angle::given) {
     require(all_finite(track.theta, track.samples) && all_finite(track.omega, track.samples),
             "angles and their rates must be finite, missing samples included: interpolate them");
@@ -289,6 +293,10 @@ void InnovationsFilter::copy(const Track& track) {
   if (track.strength != nullptr) {
     track_.insert(track_.end(), track.strength, track.strength + model_.layers() * n);
   }
+  const std::size_t before_prior = track_.size();
+  if (track.velocity_prior != nullptr) {
+    track_.insert(track_.end(), track.velocity_prior, track.velocity_prior + 6 * n);
+  }
   excluded_.assign(track.excluded, track.excluded + n);
   const double* const first = track_.data();
   problem_.track = {first,
@@ -298,7 +306,8 @@ void InnovationsFilter::copy(const Track& track) {
                     first + 4 * n,
                     track.strength == nullptr ? nullptr : first + 5 * n,
                     excluded_.data(),
-                    n};
+                    n,
+                    track.velocity_prior == nullptr ? nullptr : first + before_prior};
 }
 
 std::int64_t InnovationsFilter::remaining() const {

@@ -283,6 +283,36 @@ void check_that_all_is_written() {
   }
 }
 
+// Where the state begins it has the velocity that is expected there, or none.
+void check_velocity_prior() {
+  const Flow flow;
+  const Circle track(8);
+  std::vector<double> prior(6 * 8, missing);
+  const double expected[] = {0.02, -0.03, 0.4, 0.01, 0.01, 0.2};
+  const auto begun = [&](const driftwalk::Track& view, int velocity) {
+    InnovationsFilter filter(view, drag_model(flow, 8, Angle::state), settings, false);
+    Outputs out(1, 1, 3);
+    filter.run(1, {out.innovation.data(), out.covariance.data(), out.used.data(), out.state.data(),
+                   nullptr, nullptr});
+    return out.state[std::size_t(3 + velocity)];
+  };
+  driftwalk::Track view = track.view();
+  view.velocity_prior = prior.data();
+  CHECK(begun(view, 0) == 0 && begun(view, 2) == 0);
+  std::copy(std::begin(expected), std::end(expected), prior.begin());
+  for (int a = 0; a < 3; ++a) {
+    CHECK(begun(view, a) == expected[a]);
+  }
+  prior[5] = -0.2;
+  bool refused = false;
+  try {
+    begun(view, 0);
+  } catch (const std::invalid_argument&) {
+    refused = true;
+  }
+  CHECK(refused);
+}
+
 // A block larger than the whole grid, and one outside it: no strip may read or write past its end.
 void check_small_grid() {
   Flow flow;
@@ -520,6 +550,7 @@ int main() {
   check_flow();
   check_beyond_the_grid();
   check_that_all_is_written();
+  check_velocity_prior();
   check_small_grid();
   check_pieces(Angle::given);
   check_pieces(Angle::none);

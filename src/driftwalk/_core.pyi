@@ -320,7 +320,9 @@ class InnovationsFilter:
     # max(0, closing) + linear) times its slip; with another drag_power than 2, and no linear part,
     # that times (speed past the strip / drag_speed [m/s])^(drag_power - 2). water_acceleration and
     # water_spin: how strongly Du/Dt and half its curl push the block, 0 or 1. time_noise: of the
-    # stamps [s]. force_memory: correlation time of the force [s].
+    # stamps [s]. force_memory: correlation time of the force [s]. velocity_prior (n, 6): mean and
+    # standard deviation of vx, vy [m/s] and omega [rad/s] if the state begins at the sample, NaN
+    # where nothing is known.
     def __init__(
         self,
         time: _Floats,
@@ -359,6 +361,7 @@ class InnovationsFilter:
         drag_speed: float = 0.03,
         time_noise: float = 0.0,
         force_memory: float = 0.0,
+        velocity_prior: _Floats | None = None,
     ) -> None: ...
     @property
     def samples(self) -> int: ...

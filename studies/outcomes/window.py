@@ -1,6 +1,6 @@
 """Coverage of a fit to the part of a track that is seen in a quarter of the tank.
 
-    python studies/outcomes/window.py [RECORDINGS]        (some nine seconds of processor time each)
+    python studies/outcomes/window.py [RECORDINGS]        (some ten seconds of processor time each)
 
 One block for 20 minutes in the bundled flow, C_d 0.45 and sigma_F 0.55 mN, 0.3 mm and 0.5 degrees
 of noise in the study of the fit. Prints which 90 % intervals of C_d and sigma_F hold.
@@ -19,7 +19,7 @@ TRUTH = {"drag_coefficient": 0.45, "force_std": 5.5e-4}
 STUDY = dw.Study(
     forces={"drag_coefficient": 0.45, "force_std_N": 5.5e-4, "force_interval_s": 0.016},
     observation={"position_noise_m": 3e-4, "orientation_noise_rad": "0.5deg"},
-    fit={"spline_spacing_m": 0.03, "angle": "given"},
+    fit={"spline_spacing_m": 0.03},
 )
 
 

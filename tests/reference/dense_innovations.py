@@ -266,11 +266,13 @@ def dense_filter(
                 if restarted and not track["excluded"][k]:
                     restarted, undragged = False, (time[k] - last) / 2
         elif s is None and not np.isnan(value).any():
-            s, P, outliers = (
-                np.concatenate([value, still]),
-                scipy.linalg.block_diag(noise, unknown),
-                0,
+            prior = track.get("velocity_prior", np.full((time.size, 6), np.nan))[k]
+            known = not np.isnan(prior[0])
+            velocity, spread = (
+                (prior[:d], np.diag(prior[3 : d + 3] ** 2)) if known else (still, unknown)
             )
+            s, P = np.concatenate([value, velocity]), scipy.linalg.block_diag(noise, spread)
+            outliers = 0
             M = np.zeros((2 * d, width))
         last = time[k] if there else last
         rows["innovation"].append(e)
@@ -315,8 +317,8 @@ def make_track(time: Floats, seed: int = 5) -> dict[str, Any]:
 
 
 def difficult_track() -> dict[str, Any]:
-    """Uneven clock, missing samples, a gap of 0.7 s and one of 3 s, excluded ones, an outlier, two
-    in a row, and a jump."""
+    """Uneven clock, missing samples, a gap of 0.7 s and one of 3 s, behind which the velocity has a
+    prior, excluded ones, an outlier, two in a row, and a jump."""
     rng = np.random.default_rng(11)
     time = np.cumsum(rng.uniform(0.02, 0.16, 160))
     time[60:] += 0.7
@@ -328,4 +330,6 @@ def difficult_track() -> dict[str, Any]:
     track["x"][45] += 0.05
     track["y"][[50, 51]] += [0.05, -0.04]
     track["x"][130:] += 0.05
+    track["velocity_prior"] = np.full((160, 6), np.nan)
+    track["velocity_prior"][100:] = [0.02, -0.01, 0.3, 0.02, 0.03, 0.5]
     return track

@@ -334,6 +334,8 @@ def test_whitened_innovations_of_a_linear_world_are_standard_normal(fresh_seed):
         ({"angle_noise": 0.0}, "angle noise must be positive"),
         ({"angle_noise": np.inf}, "angle noise must be positive"),
         ({"theta": np.array([0.0, np.inf, 0.0])}, "angles must be finite, or NaN"),
+        ({"velocity_prior": np.full((3, 6), -1.0)}, "the prior of the velocity"),
+        ({"velocity_prior": np.ones((3, 3))}, r"velocity_prior must have shape \(n, 6\)"),
     ],
 )
 def test_refuses(changes, message):

@@ -13,7 +13,13 @@ from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.difference_pairs import Pair
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
-from driftwalk.likelihood.filter.series import Series, strength_of, stretches_unsettled
+from driftwalk.likelihood.filter.series import (
+    FILTER,
+    Series,
+    strength_of,
+    stretches_unsettled,
+    velocity_prior,
+)
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.newton import inverse, limited, newton_step
 from driftwalk.likelihood.preparation import body_of, estimate_of, series_of
@@ -282,6 +288,53 @@ def test_after_a_gap_two_samples_give_the_velocity_and_no_drag_does(
         for one in found:
             velocity = axis + one["state"].shape[1] // 2
             np.testing.assert_allclose(one["state"][gap + 1, [axis, velocity]], wanted, rtol=1e-9)
+
+
+def test_the_velocity_behind_a_gap_is_expected_from_other_passages(passes: Passes) -> None:
+    """Against a plain loop over all pairs of samples, in stretches of 2 s with gaps of 1.5 s."""
+    rng = np.random.default_rng(4)
+    time = np.concatenate([3.5 * n + 0.1 * np.arange(20) for n in range(40)])
+    x, y = 0.02 * np.cos(1.3 * time), 0.02 * np.sin(1.3 * time) + 1e-3 * rng.normal(size=800)
+    series = replace(
+        passes.series[0],
+        time=time,
+        x=x,
+        y=y,
+        theta=np.zeros(800),
+        angle=np.zeros(800),
+        omega=0.3 + np.cos(time),
+        excluded=(rng.uniform(size=800) < 0.02).astype(np.uint8),
+    )
+    found = velocity_prior(series, 0.01)
+    assert found is not None
+    stretch = np.repeat(np.arange(40), 20)
+    seen: list[tuple[int, int, float, list[float]]] = []
+    for k in range(796):
+        if stretch[k] == stretch[k + 4] and not series.excluded[k + 1 : k + 5].any():
+            over = time[k + 4] - time[k]
+            motion = [(x[k + 4] - x[k]) / over, (y[k + 4] - y[k]) / over, series.omega[k + 2]]
+            seen.append((k, k + 2, stretch[k], motion))
+    means, away = [], []
+    for begin in range(0, 800, 20):
+        near = [
+            (number, motion)
+            for _, middle, number, motion in seen
+            if number != stretch[begin]
+            and math.hypot(x[middle] - x[begin], y[middle] - y[begin]) <= 0.01
+        ]
+        assert len({number for number, _ in near}) >= FILTER.least_prior_stretches
+        means.append(np.mean([motion for _, motion in near], axis=0))
+        away += [motion - means[-1] for first, _, _, motion in seen if first == begin]
+    assert 30 < len(away) < 40  # an interval that is left out ends the passage
+    np.testing.assert_allclose(found[:, :3], np.repeat(means, 20, axis=0), rtol=1e-9)
+    std = np.sqrt(np.mean(np.square(away), axis=0))
+    np.testing.assert_allclose(found[:, 3:], np.broadcast_to(std, (800, 3)), rtol=1e-9)
+    kept = replace(series, velocity_prior=found).part(20, 60).velocity_prior
+    assert kept is not None
+    assert np.array_equal(kept, found[20:60])
+    assert velocity_prior(series.part(0, 20), 0.01) is None
+    # Two other stretches say too little.
+    assert velocity_prior(series.part(0, 60), 0.01) is None
 
 
 COLUMNS = ("x", "y", "theta", "omega", "angle")

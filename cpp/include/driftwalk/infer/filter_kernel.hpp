@@ -107,6 +107,9 @@ private:
     if (!state_.open && found.whole) {
       const double still[D] = {};
       open(found, still);
+      if (track_.velocity_prior != nullptr) {
+        take_velocity_prior(track_.velocity_prior + 6 * k);
+      }
     }
     if (found.there) {
       state_.seen = track_.time[k];
@@ -136,6 +139,16 @@ private:
     __builtin_memset(transition_, 0, sizeof transition_);
     if (with_sensitivities()) {
       sensitivity_.clear();
+    }
+  }
+
+  void take_velocity_prior(const double* prior) {
+    if (prior[0] != prior[0]) {
+      return;
+    }
+    for (int a = 0; a < D; ++a) {
+      state_.mean[a + D] = prior[a];
+      state_.covariance[a + D][a + D] = prior[a + 3] * prior[a + 3];
     }
   }
 

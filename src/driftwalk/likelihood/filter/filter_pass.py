@@ -273,6 +273,7 @@ class Passes:
             # one side of the block a second it is as strong as the quadratic one in its place.
             linear=0.25 * share * body.side,
             time_noise=math.sqrt(point.number("time_variance")),
+            velocity_prior=series.velocity_prior,
             **numbers,
         )
 
