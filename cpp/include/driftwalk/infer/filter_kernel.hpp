@@ -178,11 +178,7 @@ private:
   // Two samples give the velocity between them. From there to the second the drag acts, too.
   void make_up_for_drag(std::int64_t k) {
     Square<2 * D> covariance;
-    for (int a = 0; a < 2 * D; ++a) {
-      for (int b = 0; b < 2 * D; ++b) {
-        covariance[a][b] = state_.covariance[a][b];
-      }
-    }
+    copy_motion_covariance(covariance);
     const double h = state_.undragged;
     const DragResponse<D> drag = response_at(covariance, k, 0);
     const Kick<D> kick = make_kick(drag, h);
@@ -205,11 +201,7 @@ private:
     drift_mean(state_, h / 2);
     drift_covariance(state_, h / 2);
     Square<2 * D> middle;
-    for (int a = 0; a < 2 * D; ++a) {
-      for (int b = 0; b < 2 * D; ++b) {
-        middle[a][b] = state_.covariance[a][b];
-      }
-    }
+    copy_motion_covariance(middle);
     for (int a = 0; a < D; ++a) {
       middle[a + D][a + D] += white_intensity(a) * h / 2;
     }
@@ -249,6 +241,15 @@ private:
     if (with_sensitivities()) {
       sensitivity_.drift_and_kick(sensitivity_drift, kick);
       sensitivity_.add_flow(scratch_, drag, problem_.flow.columns, kick, h);
+    }
+  }
+
+  // Of the coordinates and velocities, without a force that remembers.
+  void copy_motion_covariance(Square<2 * D>& covariance) const {
+    for (int a = 0; a < 2 * D; ++a) {
+      for (int b = 0; b < 2 * D; ++b) {
+        covariance[a][b] = state_.covariance[a][b];
+      }
     }
   }
 
