@@ -394,7 +394,7 @@ private:
       const bool is_tied = buckets_->is_value[bucket] != 0 || counts_of_number_[i].all() > 1;
       part_[i] = 2 * bucket + is_tied;
     }
-    // Local, as a byte may be stored to any member for all that the compiler knows.
+    // Local copies: a store of bytes could change any member, and they would be loaded again.
     const std::int32_t* const point = point_;
     const std::int32_t* const number_of = number_of_;
     const std::int32_t* const part = part_;
