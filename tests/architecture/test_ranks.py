@@ -25,7 +25,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     # `simulation`, with what it takes, for the probe: the same bits on every worker.
     "cluster": GROUND | {"sweep", "simulation", "model", "flow"},
     "simulation": GROUND | {"model"},
-    # `record` for reading the recording of a study.
+    # `record` for reading a recording, and for steps that no body can make.
     "conditions": GROUND | {"record", "model", "flow", "simulation"},
     "motion": GROUND | {"conditions", "simulation", "comparison", "model"},
     "calibration": GROUND

@@ -333,6 +333,7 @@ def test_the_velocity_behind_a_gap_is_expected_from_other_passages(passes: Passe
     assert kept is not None
     assert np.array_equal(kept, found[20:60])
     assert velocity_prior(series.part(0, 20), 0.01) is None
+    assert velocity_prior(series.part(0, 0), 0.01) is None
     # Two other stretches say too little.
     assert velocity_prior(series.part(0, 60), 0.01) is None
 

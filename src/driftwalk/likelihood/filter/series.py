@@ -114,10 +114,8 @@ class Series:
 
     def part(self, first: int, end: int) -> Series:
         """Return the samples from a first one on, before an end."""
-        columns = ("time", "x", "y", "theta", "omega", "excluded", "angle", "velocity_prior")
-        whole = {name: getattr(self, name) for name in columns}
-        part: dict[str, Any] = {name: v if v is None else v[first:end] for name, v in whole.items()}
-        return replace(self, **part)
+        kept = slice(first, end)
+        return replace(self, **self._columns(kept), excluded=self.excluded[kept])
 
     def thinned(self, interval: float) -> Series:
         """Return samples about an interval [s] apart; the series where they are no nearer."""
@@ -126,13 +124,16 @@ class Series:
 
     def at(self, kept: npt.NDArray[np.intp]) -> Series:
         """Return the samples of these numbers, which increase."""
-        columns = ("time", "x", "y", "theta", "omega", "angle", "velocity_prior")
-        whole = {name: getattr(self, name) for name in columns}
-        thin: dict[str, Any] = {name: v if v is None else v[kept] for name, v in whole.items()}
         # An interval is left out where one of those that it holds is.
         firsts = np.append(0, kept[:-1] + 1)
-        thin["excluded"] = np.maximum.reduceat(self.excluded, firsts)
-        return replace(self, **thin)
+        excluded = np.maximum.reduceat(self.excluded, firsts)
+        return replace(self, **self._columns(kept), excluded=excluded)
+
+    def _columns(self, kept: slice | npt.NDArray[np.intp]) -> dict[str, Any]:
+        """Return some samples of all columns but `excluded`."""
+        names = ("time", "x", "y", "theta", "omega", "angle", "velocity_prior")
+        whole = {name: getattr(self, name) for name in names}
+        return {name: values if values is None else values[kept] for name, values in whole.items()}
 
 
 @dataclass(frozen=True)
@@ -440,9 +441,9 @@ def velocity_prior(series: Series, radius: float) -> Floats | None:
     The means are those of the other stretches within a radius [m] of the place.
     """
     there = np.flatnonzero(np.isfinite(series.x))
-    seen = series.at(there)
-    if not seen.gaps.any():
+    if not (np.diff(series.time[there]) > FILTER.longest_gap_s).any():
         return None
+    seen = series.at(there)
     from scipy.spatial import cKDTree
 
     stretch = np.cumsum(np.concatenate([[0], seen.gaps]))
