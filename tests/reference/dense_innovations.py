@@ -265,14 +265,14 @@ def dense_filter(
                 s, P, M = s + K @ e, keep @ P @ keep.T + K @ R @ K.T, keep @ M
                 if restarted and not track["excluded"][k]:
                     restarted, undragged = False, (time[k] - last) / 2
-        elif s is None and not np.isnan(value).any():
+        if (s is None or track["excluded"][k]) and not np.isnan(value).any():
             prior = track.get("velocity_prior", np.full((time.size, 6), np.nan))[k]
             known = not np.isnan(prior[0])
             velocity, spread = (
                 (prior[:d], np.diag(prior[3 : d + 3] ** 2)) if known else (still, unknown)
             )
             s, P = np.concatenate([value, velocity]), scipy.linalg.block_diag(noise, spread)
-            outliers = 0
+            outliers, undragged = 0, 0.0
             M = np.zeros((2 * d, width))
         last = time[k] if there else last
         rows["innovation"].append(e)

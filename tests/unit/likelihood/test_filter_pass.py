@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from fit_worlds import coarse_study, driven, recording
 
+from driftwalk.core.arrays import Floats
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.difference_pairs import Pair
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
@@ -290,21 +291,62 @@ def test_after_a_gap_two_samples_give_the_velocity_and_no_drag_does(
             np.testing.assert_allclose(one["state"][gap + 1, [axis, velocity]], wanted, rtol=1e-9)
 
 
-def test_the_velocity_behind_a_gap_is_expected_from_other_passages(passes: Passes) -> None:
-    """Against a plain loop over all pairs of samples, in stretches of 2 s with gaps of 1.5 s."""
+@pytest.fixture(scope="module")
+def stretches(passes: Passes) -> Series:
+    """Stretches of 2 s with gaps of 1.5 s, and contacts at random."""
     rng = np.random.default_rng(4)
     time = np.concatenate([3.5 * n + 0.1 * np.arange(20) for n in range(40)])
-    x, y = 0.02 * np.cos(1.3 * time), 0.02 * np.sin(1.3 * time) + 1e-3 * rng.normal(size=800)
-    series = replace(
+    return replace(
         passes.series[0],
         time=time,
-        x=x,
-        y=y,
+        x=0.02 * np.cos(1.3 * time),
+        y=0.02 * np.sin(1.3 * time) + 1e-3 * rng.normal(size=800),
         theta=np.zeros(800),
         angle=np.zeros(800),
         omega=0.3 + np.cos(time),
-        excluded=(rng.uniform(size=800) < 0.02).astype(np.uint8),
+        excluded=(rng.uniform(size=800) < 0.04).astype(np.uint8),
     )
+
+
+def test_the_velocity_behind_a_contact_is_expected_from_the_nearest_ones(stretches: Series) -> None:
+    """Against a plain loop over all pairs of contacts."""
+    series = stretches
+    found = velocity_prior(series, 0.01)
+    assert found is not None
+    time, x, y = series.time, series.x, series.y
+    passage = np.cumsum(series.begins)
+    contacts: list[int] = np.flatnonzero(series.excluded).tolist()
+    own: dict[int, list[float]] = {}
+    for k in contacts:
+        if k + 4 < time.size and passage[k] == passage[k + 4]:
+            over = time[k + 4] - time[k]
+            own[k] = [(x[k + 4] - x[k]) / over, (y[k + 4] - y[k]) / over, series.omega[k + 2]]
+    assert 15 < len(own) < len(contacts)
+    means: dict[int, Floats] = {}
+    for k in contacts:
+        apart = {j: math.hypot(x[j] - x[k], y[j] - y[k]) for j in own if j != k}
+        nearest = sorted(apart, key=apart.__getitem__)[: FILTER.prior_contacts]
+        means[k] = np.mean([own[j] for j in nearest], axis=0)
+    away = [motion - means[k] for k, motion in own.items()]
+    std = np.sqrt(np.mean(np.square(away), axis=0))
+    for k in contacts:
+        flight = found[passage == passage[k]]
+        np.testing.assert_allclose(
+            flight, np.broadcast_to(np.concatenate([means[k], std]), flight.shape), rtol=1e-9
+        )
+    # Eight others say it, and seven do not.
+    few = list(own)
+    for count, known in ((FILTER.prior_contacts, False), (FILTER.prior_contacts + 1, True)):
+        excluded = np.zeros(800, np.uint8)
+        excluded[few[:count]] = 1
+        prior = velocity_prior(replace(series, excluded=excluded), 0.01)
+        assert prior is not None
+        assert np.isfinite(prior[few[0]]).all() == known
+
+
+def test_the_velocity_behind_a_gap_is_expected_from_other_passages(stretches: Series) -> None:
+    """Against a plain loop over all pairs of samples."""
+    series, time, x, y = stretches, stretches.time, stretches.x, stretches.y
     found = velocity_prior(series, 0.01)
     assert found is not None
     stretch = np.repeat(np.arange(40), 20)
@@ -324,18 +366,24 @@ def test_the_velocity_behind_a_gap_is_expected_from_other_passages(passes: Passe
         ]
         assert len({number for number, _ in near}) >= FILTER.least_prior_stretches
         means.append(np.mean([motion for _, motion in near], axis=0))
-        away += [motion - means[-1] for first, _, _, motion in seen if first == begin]
-    assert 30 < len(away) < 40  # an interval that is left out ends the passage
-    np.testing.assert_allclose(found[:, :3], np.repeat(means, 20, axis=0), rtol=1e-9)
+        if not series.excluded[begin]:
+            away += [motion - means[-1] for first, _, _, motion in seen if first == begin]
+    assert 25 < len(away) < 40  # an interval that is left out ends the passage
     std = np.sqrt(np.mean(np.square(away), axis=0))
-    np.testing.assert_allclose(found[:, 3:], np.broadcast_to(std, (800, 3)), rtol=1e-9)
+    after = np.cumsum(series.begins)
+    # Until the first contact of the stretch.
+    after = (after == after[20 * stretch]) & (series.excluded[20 * stretch] == 0)
+    assert np.count_nonzero(~after) > 100
+    np.testing.assert_allclose(found[after, :3], np.repeat(means, 20, axis=0)[after], rtol=1e-9)
+    np.testing.assert_allclose(found[after, 3:], np.broadcast_to(std, (800, 3))[after], rtol=1e-9)
     kept = replace(series, velocity_prior=found).part(20, 60).velocity_prior
     assert kept is not None
-    assert np.array_equal(kept, found[20:60])
-    assert velocity_prior(series.part(0, 20), 0.01) is None
-    assert velocity_prior(series.part(0, 0), 0.01) is None
+    np.testing.assert_array_equal(kept, found[20:60])
+    free = replace(series, excluded=np.zeros(800, np.uint8))
+    assert velocity_prior(free.part(0, 20), 0.01) is None
+    assert velocity_prior(free.part(0, 0), 0.01) is None
     # Two other stretches say too little.
-    assert velocity_prior(series.part(0, 60), 0.01) is None
+    assert velocity_prior(free.part(0, 60), 0.01) is None
 
 
 COLUMNS = ("x", "y", "theta", "omega", "angle")

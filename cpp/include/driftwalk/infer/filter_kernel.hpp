@@ -104,7 +104,8 @@ private:
     } else {
       write_nothing(row);
     }
-    if (!state_.open && found.whole) {
+    // A contact within the last interval may have displaced the block, too.
+    if (found.whole && (!state_.open || track_.excluded[k] != 0)) {
       const double still[D] = {};
       open(found, still);
       if (track_.velocity_prior != nullptr) {

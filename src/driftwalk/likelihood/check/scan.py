@@ -4,7 +4,9 @@ The errors of prediction see a change of the flow badly: a wrong flow makes the 
 one sample tells little of the next. So the body's own velocity is looked at. For every stretch of
 the recording (one part, or several that follow each other) its mean in each cell is compared with
 the mean in the same cell during the rest; how far apart chance alone brings them is known from
-simulated recordings, whose flow changes as the fitted one does.
+simulated recordings, whose flow changes as the fitted one does. Compared is the mean over the cells
+of the squared differences in units of what so many samples leave open, because a body that stays in
+one place has many samples in few cells, and one that travels has few in many.
 """
 
 from __future__ import annotations
@@ -65,11 +67,12 @@ def scan_of(
     stretches = _stretches(layout)
     if not stretches:
         return None
-    table = np.array([_differences(one, stretches, layout) for one in (real, *simulated)])
-    known = (table > 0.0).all(axis=0)
+    found = np.array([_differences(one, stretches, layout) for one in (real, *simulated)])
+    known = (found > 0.0).all(axis=(0, 1))
     if not known.any():
         return None
-    logs = np.log(table[:, known])
+    differences, samples = found[..., known].swapaxes(0, 1)
+    logs = np.log(differences * np.sqrt(samples))
     mine, theirs = logs[0], logs[1:]
     spread = max(float(np.sqrt(theirs.var(axis=0, ddof=1).mean())), SCAN.least_spread)
     off = (mine - theirs.mean(axis=0)) / spread
@@ -81,16 +84,16 @@ def scan_of(
     scale = largest.std(ddof=1) * np.sqrt(6.0) / np.pi
     largest_of = gumbel_r(largest.mean() - np.euler_gamma * scale, scale)
     first, last = stretches[int(np.flatnonzero(known)[best])]
-    chosen = np.exp(theirs[:, best])
+    chosen = differences[1:, best]
     sigmas = float(largest_of.isf(level) + norm.ppf(POWER.share))
     return Scan(
         first,
         last,
-        float(np.exp(mine[best])),
+        float(differences[0, best]),
         float(np.median(chosen)),
         float(chosen.std(ddof=1)),
         float(largest_of.sf(off[best])),
-        float(np.exp(np.median(theirs.mean(axis=0)) + sigmas * spread)),
+        float(np.median(np.exp(theirs.mean(axis=0) + sigmas * spread) / np.sqrt(samples[0]))),
     )
 
 
@@ -109,15 +112,15 @@ def _stretches(layout: Layout) -> list[tuple[int, int]]:
 def _differences(
     paths: Sequence[Path], stretches: Sequence[tuple[int, int]], layout: Layout
 ) -> Floats:
-    """Return the root mean square difference of each stretch to the rest [m/s], 0 for none.
+    """Return the root mean square difference of each stretch to the rest [m/s], and samples a cell.
 
-    The rest is that in the same flow.
+    The rest is that in the same flow. Both are 0 where no cell has enough of either.
     """
     sums = np.concatenate([_sums(path, index, layout) for index, path in enumerate(paths)])
     flows = np.array([layout.flow(part) for part in range(layout.parts)])
     whole = {int(flow): sums[flows == flow].sum(axis=0) for flow in np.unique(flows)}
     running = np.concatenate([np.zeros((1, *sums.shape[1:])), np.cumsum(sums, axis=0)])
-    found = np.zeros(len(stretches))
+    found = np.zeros((2, len(stretches)))
     for k, (first, last) in enumerate(stretches):
         inside = running[last + 1] - running[first]
         rest = whole[int(flows[first])] - inside
@@ -126,7 +129,8 @@ def _differences(
             inside, rest = inside[:, both], rest[:, both]
             apart = inside[1:] / inside[0] - rest[1:] / rest[0]
             weight = 1.0 / (1.0 / inside[0] + 1.0 / rest[0])
-            found[k] = np.sqrt((weight * (apart**2).sum(axis=0)).sum() / weight.sum())
+            found[0, k] = np.sqrt((weight * (apart**2).sum(axis=0)).sum() / weight.sum())
+            found[1, k] = weight.mean()
     return found
 
 

@@ -53,6 +53,8 @@ class FilterPolicy(NamedTuple):
     1 mm/s is left."""
     least_prior_stretches: int = 3
     """Fewer give no velocity. Chosen by hand."""
+    prior_contacts: int = 8
+    """Nearest other contacts that give the velocity behind a contact. Chosen by hand."""
     settling_samples: int = 3
     """Samples left out after a missing frame when other explanations of an error are tried: in
     these a wrong place counts in the filter's velocity. Chosen by hand."""
@@ -88,8 +90,9 @@ class Series:
     first: float = 0.0
     """Time of the recording's first sample [s]."""
     velocity_prior: Floats | None = None
-    """Mean and standard deviation of velocity and spin where a stretch between gaps begins, for
-    each of its samples, shape (n, 6) [m/s, rad/s], NaN where unknown; None without gaps."""
+    """Mean and standard deviation of velocity and spin where a passage begins, behind a gap or a
+    contact, for each of its samples, shape (n, 6) [m/s, rad/s], NaN where unknown; None where
+    there are none."""
 
     @property
     def gaps(self) -> Bools:
@@ -436,18 +439,21 @@ def series_of(
 
 
 def velocity_prior(series: Series, radius: float) -> Floats | None:
-    """Return mean and standard deviation of the velocities with which stretches between gaps begin.
+    """Return mean and standard deviation of the velocities with which the passages begin.
 
-    The means are those of the other stretches within a radius [m] of the place.
+    Behind a gap the means are those of the other stretches within a radius [m] of the place, and
+    behind a contact those with which the nearest other passages begin.
     """
     there = np.flatnonzero(np.isfinite(series.x))
-    if not (np.diff(series.time[there]) > FILTER.longest_gap_s).any():
+    if there.size < 2:
         return None
     seen = series.at(there)
+    if not seen.begins[1:].any():
+        return None
     from scipy.spatial import cKDTree
 
     stretch = np.cumsum(np.concatenate([[0], seen.gaps]))
-    passage = np.cumsum(seen.begins)
+    passage = np.cumsum(seen.begins) - 1
     span = max(seen._within(FILTER.prior_span_s), 2)
     last = np.arange(span, seen.time.size)
     last = last[passage[last] == passage[last - span]]
@@ -457,23 +463,35 @@ def velocity_prior(series: Series, radius: float) -> Floats | None:
     place = np.column_stack([seen.x, seen.y])
     velocity = (place[last] - place[first]) / (seen.time[last] - seen.time[first])[:, None]
     motion = np.column_stack([velocity, seen.omega[middle]])
-    tree = cKDTree(place[middle])
-    begins = np.flatnonzero(np.diff(stretch, prepend=-1))
+    begins = np.flatnonzero(seen.begins)
     mean, own = np.full((2, begins.size, 3), np.nan)
-    for row, begin in enumerate(begins):
-        near = np.array(tree.query_ball_point(place[begin], radius), dtype=int)
-        near = near[stretch[middle[near]] != row]
+    begun, at, _ = np.intersect1d(begins, first, assume_unique=True, return_indices=True)
+    own[at] = motion[np.searchsorted(first, begun)]
+    touching = seen.excluded[begins] != 0
+    tree = cKDTree(place[middle])
+    for row in np.flatnonzero(~touching) if seen.gaps.any() else ():
+        near = np.array(tree.query_ball_point(place[begins[row]], radius), dtype=int)
+        near = near[stretch[middle[near]] != stretch[begins[row]]]
         if np.unique(stretch[middle[near]]).size >= FILTER.least_prior_stretches:
             mean[row] = motion[near].mean(axis=0)
-        at = np.searchsorted(first, begin)
-        if at < first.size and first[at] == begin:
-            own[row] = motion[at]
-    known = np.isfinite(mean + own).all(axis=1)
-    if np.count_nonzero(known) < FILTER.least_prior_stretches:
+    others = np.flatnonzero(touching & np.isfinite(own).all(axis=1))
+    if others.size > FILTER.prior_contacts:
+        rows = np.flatnonzero(touching)
+        count = FILTER.prior_contacts + 1
+        nearest = others[cKDTree(place[begins[others]]).query(place[begins[rows]], count)[1]]
+        counts = nearest != rows[:, None]
+        counts[counts.all(axis=1), -1] = False
+        mean[rows] = own[nearest[counts].reshape(-1, count - 1)].mean(axis=1)
+    rows = np.full((begins.size, 6), np.nan)
+    for kind in (touching, ~touching):
+        known = kind & np.isfinite(mean + own).all(axis=1)
+        if np.count_nonzero(known) >= FILTER.least_prior_stretches:
+            std = np.sqrt(((own - mean)[known] ** 2).mean(axis=0))
+            rows[kind] = np.column_stack([mean[kind], np.broadcast_to(std, mean[kind].shape)])
+    if not np.isfinite(rows).any():
         return None
-    std = np.sqrt(((own - mean)[known] ** 2).mean(axis=0))
     prior = np.full((series.time.size, 6), np.nan)
-    prior[there] = np.column_stack([mean, np.broadcast_to(std, mean.shape)])[stretch]
+    prior[there] = rows[passage]
     return prior
 
 
