@@ -83,7 +83,7 @@ def test_a_law_that_was_found_amid_departures_is_compared_again(settled_by: floa
     its standard deviations, which right code misses once in 16,000 recordings.
     """
     study = coarse_study("auto")
-    ready = prepare([driven(5, 200.0, {})], study, None, None)
+    ready = prepare([driven(6, 200.0, {})], study, None, None)
     passes = ready.passes
     assumptions = assumptions_of(study, ready.angle, recordings=1, flows=1)
     modes = ModeSearch(passes, Prior(passes), study.fit.iterations)

@@ -55,7 +55,7 @@ def floating() -> xr.Dataset:
 @pytest.mark.slow
 def test_the_power_of_the_drag_is_found() -> None:
     power = 1.5
-    fit = dw.fit_motion(driven(6, SECONDS, {"forces.drag_power": power}), study_with())
+    fit = dw.fit_motion(driven(6, 1.1 * SECONDS, {"forces.drag_power": power}), study_with())
     assert within(fit, "drag_power", power), FALSE_ALARM
     assert within(fit, "drag_coefficient", 0.45), FALSE_ALARM
     low, high = fit["interval"].sel(parameter="drag_power").values
