@@ -43,8 +43,7 @@ class FilterPolicy(NamedTuple):
     """Mean time between contacts with the wall below which C_d is not settled [s]. Where it was
     shorter, C_d was 2 to 24 times too large in three of eleven recordings of studies/verdict
     (held-out set); at 1.9 s and more it was right. The speed after a contact is taken from two
-    positions, whose noise seems to be drag: simulated with 0.3 mm at 10 Hz and 3 cm/s, C_d came
-    out 19 % too large with a contact every 0.6 s and right with one every 2 s."""
+    positions, whose noise seems to be drag. Measured before a velocity was expected there."""
     prior_reach: float = 0.5
     """Sides of the block around the place where a stretch begins within which the other stretches
     give the velocity that is expected there. Chosen by hand."""
@@ -444,50 +443,64 @@ def velocity_prior(series: Series, radius: float) -> Floats | None:
     Behind a gap the means are those of the other stretches within a radius [m] of the place, and
     behind a contact those with which the nearest other passages begin.
     """
+    from scipy.spatial import cKDTree
+
     there = np.flatnonzero(np.isfinite(series.x))
     if there.size < 2:
         return None
     seen = series.at(there)
     if not seen.begins[1:].any():
         return None
-    from scipy.spatial import cKDTree
-
-    stretch = np.cumsum(np.concatenate([[0], seen.gaps]))
     passage = np.cumsum(seen.begins) - 1
-    span = max(seen._within(FILTER.prior_span_s), 2)
-    last = np.arange(span, seen.time.size)
-    last = last[passage[last] == passage[last - span]]
+    half = max(seen._within(0.5 * FILTER.prior_span_s), 1)
+    last = np.arange(2 * half, seen.time.size)
+    last = last[passage[last] == passage[last - 2 * half]]
     if not last.size:
         return None
-    first, middle = last - span, last - span // 2
+    first, middle = last - 2 * half, last - half
     place = np.column_stack([seen.x, seen.y])
-    velocity = (place[last] - place[first]) / (seen.time[last] - seen.time[first])[:, None]
-    motion = np.column_stack([velocity, seen.omega[middle]])
+
+    def mean_velocity(end: npt.NDArray[np.intp]) -> Floats:
+        """Return the mean velocity from `first` to a sample, and the spin."""
+        velocity = (place[end] - place[first]) / (seen.time[end] - seen.time[first])[:, None]
+        return np.column_stack([velocity, seen.omega[middle]])
+
+    motion = mean_velocity(last)
     begins = np.flatnonzero(seen.begins)
-    mean, own = np.full((2, begins.size, 3), np.nan)
-    begun, at, _ = np.intersect1d(begins, first, assume_unique=True, return_indices=True)
-    own[at] = motion[np.searchsorted(first, begun)]
     touching = seen.excluded[begins] != 0
-    tree = cKDTree(place[middle])
-    for row in np.flatnonzero(~touching) if seen.gaps.any() else ():
-        near = np.array(tree.query_ball_point(place[begins[row]], radius), dtype=int)
-        near = near[stretch[middle[near]] != stretch[begins[row]]]
-        if np.unique(stretch[middle[near]]).size >= FILTER.least_prior_stretches:
-            mean[row] = motion[near].mean(axis=0)
-    others = np.flatnonzero(touching & np.isfinite(own).all(axis=1))
-    if others.size > FILTER.prior_contacts:
-        rows = np.flatnonzero(touching)
+    begun, at = np.intersect1d(begins, first, assume_unique=True, return_indices=True)[1:]
+    # What is expected over the span, in its middle and where it begins, and what is found.
+    mean, start, own = np.full((3, begins.size, 3), np.nan)
+    own[begun] = motion[at]
+    if seen.gaps.any():
+        stretch = np.cumsum(np.concatenate([[0], seen.gaps]))
+        near = cKDTree(place[middle]).query_ball_point(place[begins[~touching]], radius)
+        for row, some in zip(np.flatnonzero(~touching), near, strict=True):
+            others = np.array(some, dtype=int)
+            others = others[stretch[middle[others]] != stretch[begins[row]]]
+            if np.unique(stretch[middle[others]]).size >= FILTER.least_prior_stretches:
+                start[row] = mean[row] = motion[others].mean(axis=0)
+    flights = np.flatnonzero(touching & np.isfinite(own).all(axis=1))
+    if flights.size > FILTER.prior_contacts:
         count = FILTER.prior_contacts + 1
-        nearest = others[cKDTree(place[begins[others]]).query(place[begins[rows]], count)[1]]
-        counts = nearest != rows[:, None]
-        counts[counts.all(axis=1), -1] = False
-        mean[rows] = own[nearest[counts].reshape(-1, count - 1)].mean(axis=1)
+        tree = cKDTree(place[begins[flights]])
+        near = np.asarray(tree.query(place[begins[touching]], count)[1])
+        others = flights[near] != np.flatnonzero(touching)[:, None]
+        others[others.all(axis=1), -1] = False
+        nearest = flights[near[others].reshape(-1, FILTER.prior_contacts)]
+        # The drag slows the body down. What the filter needs is the velocity in the middle of the
+        # first interval, in which nothing drags: on the line through those in the middles of both
+        # spans.
+        sooner = np.full_like(own, np.nan)
+        early = mean_velocity(middle)
+        sooner[begun] = (early + (early - motion) * (half - 1) / half)[at]
+        mean[touching], start[touching] = (one[nearest].mean(axis=1) for one in (own, sooner))
     rows = np.full((begins.size, 6), np.nan)
     for kind in (touching, ~touching):
         known = kind & np.isfinite(mean + own).all(axis=1)
         if np.count_nonzero(known) >= FILTER.least_prior_stretches:
             std = np.sqrt(((own - mean)[known] ** 2).mean(axis=0))
-            rows[kind] = np.column_stack([mean[kind], np.broadcast_to(std, mean[kind].shape)])
+            rows[kind] = np.column_stack([start[kind], np.broadcast_to(std, start[kind].shape)])
     if not np.isfinite(rows).any():
         return None
     prior = np.full((series.time.size, 6), np.nan)
