@@ -183,10 +183,13 @@ class LocalMeans(NamedTuple):
     chi_squared: Floats
     """Squared distance of the mean from zero in its own standard deviations; NaN where there are
     too few samples."""
+    drag_change: Floats
+    """What the mean errors have added to the fitted ln C_d, (groups,)."""
 
 
 def local_scores(score: Floats, count: Floats, slope: Floats, covariance: Floats) -> LocalMeans:
-    """Return the sums of groups with their chi squared of D degrees of freedom."""
+    """Return the means of groups with their chi squared of D degrees of freedom."""
+    mean = score / np.maximum(count, 1.0)[:, None]
     chi_squared = np.full(count.size, np.nan)
     enough = np.flatnonzero(count >= GROUP.fewest_in_cell)
     if enough.size:
@@ -196,7 +199,9 @@ def local_scores(score: Floats, count: Floats, slope: Floats, covariance: Floats
         value, vector = np.linalg.eigh(left)
         along = np.einsum("gde,gd->ge", vector, score[enough]) / np.sqrt(count[enough])[:, None]
         chi_squared[enough] = (along**2 / np.maximum(value, GROUP.cell_freedom)).sum(axis=1)
-    return LocalMeans(count, score / np.maximum(count, 1.0)[:, None], chi_squared)
+    # A step of Gauss and Newton from errors that are nothing but these means.
+    drag_change = np.einsum("gd,gdp,p->g", mean, slope, covariance[-1])
+    return LocalMeans(count, mean, chi_squared, drag_change)
 
 
 class Trend(NamedTuple):

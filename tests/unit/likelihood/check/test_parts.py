@@ -14,12 +14,15 @@ from driftwalk.likelihood.check.criteria import (
     LEAST,
     motion_criterion,
     noise_criterion,
+    place_criterion,
     strength_criterion,
     tail_criterion,
+    time_and_place_criterion,
 )
 from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, velocity_at
 from driftwalk.likelihood.check.place import (
     Layout,
+    LocalMeans,
     Spread,
     Trend,
     cell_of,
@@ -110,6 +113,8 @@ def test_chi_squared_of_a_cell_by_dense_algebra() -> None:
         total = matrix @ white
         assert local.chi_squared[k] == pytest.approx(total @ np.linalg.solve(left, total))
         assert local.mean[k] == pytest.approx(total / matrix[0].sum())
+        step = covariance @ jacobian.T @ (matrix.T @ local.mean[k])
+        assert local.drag_change[k] == pytest.approx(step[-1])
     assert local.samples.sum() == ROWS / COMPONENTS
 
 
@@ -400,6 +405,31 @@ def test_steps_that_differ_are_put_into_words() -> None:
     assert not small.failed
     assert "the KS distance of the steps is 0.09, up to 0.10 is tolerated" in (small.note or "")
     assert not motion_criterion(None, angle="given").failed
+
+
+@pytest.mark.parametrize(("added", "fails"), [(0.004, False), (-0.006, True)])
+def test_a_wrong_place_that_hardly_counts_in_the_drag_is_a_note(added: float, fails: bool) -> None:
+    """Two cells stand out, each in one part of the recording; what the others add is chance."""
+    layout = ten_parts()
+    cells, parts, dof = layout.cells, layout.parts, 2
+    alone, drag_change = np.full((parts, cells), float(dof)), np.full((parts, cells), 0.1)
+    alone[3, [7, 11]], drag_change[3, [7, 11]] = 150.0, added
+    some = np.ones((parts, cells, dof))
+    local = LocalMeans(
+        50.0 * some[..., 0].ravel(), some.reshape(-1, dof), alone.ravel(), drag_change.ravel()
+    )
+    whole = LocalMeans(50.0 * some[0, :, 0], some[0], alone[3], drag_change[3])
+    for found in (place_criterion(whole, layout), time_and_place_criterion(local, layout)):
+        assert found.p_value < 1e-6
+        assert found.size == pytest.approx(2.0 * abs(added))
+        assert found.failed == fails
+        assert fails == (found.note is None)
+    note = place_criterion(whole, layout).note
+    if note is not None:
+        assert "C_d is 0.8 % off by these errors, and 1 % is tolerated; the mean error" in note
+    # Where no cell stands out, a whole part that is off is no matter of a place.
+    alone[3] = 12.0
+    assert time_and_place_criterion(local._replace(chi_squared=alone.ravel()), layout).failed
 
 
 def test_too_few_sound_replicates_are_refused() -> None:
