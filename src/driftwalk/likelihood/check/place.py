@@ -184,7 +184,7 @@ class LocalMeans(NamedTuple):
     """Squared distance of the mean from zero in its own standard deviations; NaN where there are
     too few samples."""
     drag_change: Floats
-    """What the mean errors have added to the fitted ln C_d, (groups,)."""
+    """Change of the fitted ln C_d by the mean errors, (groups,)."""
 
 
 def local_scores(score: Floats, count: Floats, slope: Floats, covariance: Floats) -> LocalMeans:
