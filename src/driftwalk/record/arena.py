@@ -11,8 +11,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError, argument_text, naming_its_file
-from driftwalk.core.units import in_percent
-from driftwalk.record.circle import CIRCLE, fit_circle, tank_radius_bound
+from driftwalk.core.units import in_percent, parse_quantity
+from driftwalk.record.circle import (
+    CIRCLE,
+    RECTANGLE,
+    extent_of,
+    fit_circle,
+    tank_radius_bound,
+)
 from driftwalk.record.raw import Array
 
 
@@ -98,19 +104,16 @@ def place_arena(
     size, _, center = rest.partition("@")
     if kind == "fit" and not rest:
         return _fitted(x, y, block_side=block_side)
-    if kind == "circle" and size:
-        return _circle(_length(size, text), x, y, center=_center(center, text), reach=reach)
-    if kind in ("rect", "rectangle") and size.count("x") == 1:
-        width, height = (_length(part, text) for part in size.split("x"))
-        return _rectangle(width, height, x, y, center=_center(center, text), reach=reach)
     if kind == "polygon" and rest:
         return _polygon(Path(rest))
-    raise InputError(f"`tank` is circle:D, rect:WxH, polygon:FILE or fit; got '{text}'")
+    rectangle = kind in RECTANGLE and size.count("x") == 1
+    if not rectangle and not (kind == "circle" and size):
+        raise InputError(f"`tank` is circle:D, rect:WxH, polygon:FILE or fit; got '{text}'")
+    sides = [_length(part, text) for part in (size.split("x") if rectangle else [size])]
+    return _placed(sides, x, y, _center(center, text), reach)
 
 
 def _length(text: str, whole: str) -> float:
-    from driftwalk.core.units import parse_quantity
-
     try:
         value = parse_quantity(text, "m")
     except ValueError as error:
@@ -167,81 +170,44 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
 
 
 def _placed(
-    arena: dict[str, Any],
-    size: float,
-    beyond: Callable[[float, float], Array],
-    fitted: Callable[[], tuple[tuple[float, float], dict[str, Any]]],
-    *,
-    center: tuple[float, float] | None,
-    reach: Reach,
+    sides: list[float], x: Array, y: Array, center: tuple[float, float] | None, reach: Reach
 ) -> PlacedArena:
-    """Return an arena whose centre is given, the file's origin, or fitted to the positions.
+    """Return a circle of one size or a rectangle of two.
 
-    `beyond` returns how far each position is outside, given the centre.
+    Its centre is given, the file's origin, or fitted to the positions.
     """
+
+    def beyond(center_x: float, center_y: float) -> Array:
+        if len(sides) == 1:
+            return np.hypot(x - center_x, y - center_y) - 0.5 * sides[0]
+        return np.maximum(np.abs(x - center_x) - sides[0] / 2, np.abs(y - center_y) - sides[1] / 2)
+
+    arena: dict[str, Any] = {"shape": "circle", "diameter_m": sides[0]}
+    if len(sides) == 2:
+        arena = {"shape": "rectangle", "width_m": sides[0], "height_m": sides[1]}
     found: dict[str, Any] = {"by": "given"}
     at_origin = beyond(0.0, 0.0) <= 0.0
     if center is None and at_origin.size and float(at_origin.mean()) >= _ARENA.inside:
         center, found = (0.0, 0.0), {"by": "origin of the file"}
-    elif center is None:
-        center, found = fitted()
-    outside = beyond(*center)
-    found |= {"center_m": list(center), "samples_outside": int((outside > 0.0).sum())}
-    return PlacedArena(
-        {**arena, "center_m": [0.0, 0.0]}, center, found, _outside(outside, size, reach)
-    )
-
-
-def _circle(
-    diameter: float, x: Array, y: Array, *, center: tuple[float, float] | None, reach: Reach
-) -> PlacedArena:
-    def beyond(center_x: float, center_y: float) -> Array:
-        return np.hypot(x - center_x, y - center_y) - 0.5 * diameter
-
-    def fitted() -> tuple[tuple[float, float], dict[str, Any]]:
+    elif center is None and len(sides) == 1:
         fit = fit_circle(x, y)
-        known = {"radius_of_centers_m": fit.radius, "sectors_visited_share": fit.coverage}
-        return (fit.center_x, fit.center_y), {"by": "fit", **known}
-
-    arena = {"shape": "circle", "diameter_m": diameter}
-    return _placed(arena, diameter, beyond, fitted, center=center, reach=reach)
-
-
-def _rectangle(
-    width: float,
-    height: float,
-    x: Array,
-    y: Array,
-    *,
-    center: tuple[float, float] | None,
-    reach: Reach,
-) -> PlacedArena:
-    def beyond(center_x: float, center_y: float) -> Array:
-        outside = np.abs(x - center_x) - width / 2, np.abs(y - center_y) - height / 2
-        return np.maximum(*outside)
-
-    def fitted() -> tuple[tuple[float, float], dict[str, Any]]:
+        center, found = (fit.center_x, fit.center_y), {"by": "fit"}
+        found |= {"radius_of_centers_m": fit.radius, "sectors_visited_share": fit.coverage}
+    elif center is None:
         if not x.size:
             raise InputError("the arena's centre cannot be fitted: the recording has no positions")
-        # The middle between the outermost positions, a few tracking errors aside.
-        middle = [float(np.percentile(v, [0.05, 99.95]).mean()) for v in (x, y)]
-        return (middle[0], middle[1]), {"by": "fit"}
-
-    arena = {"shape": "rectangle", "width_m": width, "height_m": height}
-    return _placed(arena, min(width, height), beyond, fitted, center=center, reach=reach)
-
-
-def _outside(beyond: Array, size: float, reach: Reach) -> list[str]:
-    """Return what to say where more positions lie beyond the wall than noise takes there."""
-    if (beyond > 0.0).sum() <= _ARENA.most_beyond * beyond.size:
-        return []
-    outside = int((beyond > reach(size)).sum())
-    if outside <= _ARENA.most_beyond * beyond.size:
-        return []
-    return [
-        f"{outside} of {beyond.size} positions lie outside the arena: its size, or the scale, is "
-        "wrong"
-    ]
+        ends = [extent_of(axis) for axis in (x, y)]
+        center, found = (float(ends[0].mean()), float(ends[1].mean())), {"by": "fit"}
+    outside = beyond(*center)
+    found |= {"center_m": list(center), "samples_outside": int((outside > 0.0).sum())}
+    notes = []
+    most = _ARENA.most_beyond * x.size
+    # More positions beyond the wall than noise takes there.
+    if found["samples_outside"] > most and (far := int((outside > reach(min(sides))).sum())) > most:
+        notes = [
+            f"{far} of {x.size} positions lie outside the arena: its size, or the scale, is wrong"
+        ]
+    return PlacedArena({**arena, "center_m": [0.0, 0.0]}, center, found, notes)
 
 
 @naming_its_file

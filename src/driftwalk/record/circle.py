@@ -42,6 +42,8 @@ class CirclePolicy(NamedTuple):
 
 
 CIRCLE: Final = CirclePolicy()
+RECTANGLE: Final = ("rect", "rectangle")
+"""Words for a rectangular tank."""
 
 
 class CircleFit(NamedTuple):
@@ -173,6 +175,11 @@ def _quantile_fit(design: Array, values: Array, share: float) -> tuple[float, fl
     return x, y, radius
 
 
+def extent_of(coordinate: Array) -> Array:
+    """Return the ends of a coordinate, without the few samples beyond that are tracking errors."""
+    return np.percentile(coordinate, [CIRCLE.outside_percent, 100.0 - CIRCLE.outside_percent])
+
+
 def implied_scale(bodies: Sequence[RawBody], tank: str | None) -> str:
     """Return what scale the extent of the positions implies, for a file that does not say it.
 
@@ -195,15 +202,14 @@ def implied_scale(bodies: Sequence[RawBody], tank: str | None) -> str:
     try:
         sides = [parse_quantity(part, "m") for part in size.split("x")]
     except ConfigurationError:
-        sides = [0.0]
-    stated = min(sides) > 0.0
-    if kind in ("rect", "rectangle"):
+        sides = []
+    if not min(sides, default=0.0) > 0.0:
+        sides = []
+    if kind in RECTANGLE:
         known = np.isfinite(x) & np.isfinite(y)
-        if not stated or len(sides) != 2 or not known.any():
+        if len(sides) != 2 or not known.any():
             return ""
-        # Without the few samples beyond each side that are tracking errors.
-        ends = [CIRCLE.outside_percent, 100.0 - CIRCLE.outside_percent]
-        spans = [float(np.ptp(np.percentile(axis[known], ends))) for axis in (x, y)]
+        spans = [float(np.ptp(extent_of(axis[known]))) for axis in (x, y)]
         if min(spans) <= 0.0:
             return ""
         bound = min(side / span for side, span in zip(sides, spans, strict=True))
@@ -218,7 +224,7 @@ def implied_scale(bodies: Sequence[RawBody], tank: str | None) -> str:
     if fit.coverage < CIRCLE.enough_visited:
         return ""
     across = f"the positions fill a circle of {2.0 * fit.radius:.4g} units across"
-    if kind != "circle" or not stated or len(sides) != 1:
+    if kind != "circle" or len(sides) != 1:
         return (
             f'{across}: state the tank, as in `tank="circle:30cm"`, for the scale that they imply'
         )

@@ -26,7 +26,7 @@ from driftwalk.core.arrays import Bools, Codes, Integers
 from driftwalk.core.errors import DAMAGED, FormatError, naming_its_file
 from driftwalk.record.bad_row import check_lines, decoded_line
 from driftwalk.record.raw import MISSING, NAMELESS, Array, TableLayout
-from driftwalk.record.tables.stamps import StampError, StampReader, calendar_of, clock_of_stamps
+from driftwalk.record.tables.stamps import RowError, StampReader, calendar_of, clock_of_stamps
 
 UTF16: Final = "UTF-16"
 """Encoding of "Unicode text", which begins with a byte order mark."""
@@ -369,7 +369,7 @@ class _Collected:
                 ticks.append(reader.read(frame[column].fillna("").to_numpy(dtype=object)))
             column = self._layout.stamps[0]
             clock, self._origin = clock_of_stamps(ticks, self._origin)
-        except StampError as error:
+        except RowError as error:
             rows = (at for at, of in enumerate(block.split(b"\n"), start=line) if of.strip())
             raise FormatError(
                 f"{error} (column '{self._layout.names[column]}')",

@@ -93,7 +93,7 @@ def find_box(
         return replace(box, image=(int(match["w"]), int(match["h"]))) if match["w"] else box
     if {"x", "y"} & set(chosen) and not {"x1", "w"} & set(chosen):
         return None
-    if getattr(source, "matrices", False):
+    if source.matrices:
         return None
     quad = _quad(source)
     if quad is not None:

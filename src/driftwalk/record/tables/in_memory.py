@@ -22,7 +22,7 @@ from driftwalk.record.raw import MISSING, Array, TableLayout
 from driftwalk.record.tables.stamps import (
     MOMENT,
     OF_DAY,
-    StampError,
+    RowError,
     StampForm,
     StampReader,
     Ticks,
@@ -50,17 +50,14 @@ TABLE: Final = TablePolicy()
 class TableSource(Protocol):
     """A table with one row per sample."""
 
-    @property
-    def names(self) -> list[str]:
-        """Names of the columns, ``""`` where there is none."""
-
-    @property
-    def units(self) -> list[str]:
-        """Units in a row below the names; empty where there is no such row."""
-
-    @property
-    def has_header(self) -> bool:
-        """Whether the columns have names."""
+    names: list[str]
+    """Names of the columns, ``""`` where there is none."""
+    units: list[str]
+    """Units in a row below the names; empty where there is no such row."""
+    has_header: bool
+    """Whether the columns have names."""
+    matrices: bool
+    """Whether numbers after x and y count the columns of matrices, each of which is a body."""
 
     def sample(self) -> list[list[str]]:
         """Return the first rows as texts."""
@@ -88,15 +85,6 @@ _MOMENTS: Final = (datetime.datetime, datetime.date, np.datetime64)
 _TIMES: Final = (datetime.time, datetime.timedelta, np.timedelta64)
 
 
-class CellError(ValueError):
-    """Raised by a value that is not of the kind that its column has to be of."""
-
-    def __init__(self, row: int, reason: str) -> None:
-        super().__init__(reason)
-        self.row = row
-        """Row of the column, from 0."""
-
-
 def objects(cells: Sequence[Any]) -> Values:
     """Return cells as a column of objects."""
     values = np.empty(len(cells), dtype=object)
@@ -116,7 +104,7 @@ def as_numbers(values: Values, name: str) -> Array:
 
     Raises
     ------
-    CellError
+    RowError
         At the first value that is no number.
 
     Examples
@@ -124,14 +112,10 @@ def as_numbers(values: Values, name: str) -> Array:
     >>> as_numbers(np.array([1, None, "2,5"], dtype=object), "x").tolist()
     [1.0, nan, 2.5]
     """
-    if isinstance(values, np.ma.MaskedArray):
-        hidden = np.ma.getmaskarray(values)
-        found = as_numbers(np.asarray(values.data), name)
-        found[hidden] = np.nan
-        return found
-    if values.dtype.kind in "fiu":
+    masked = isinstance(values, np.ma.MaskedArray)
+    if values.dtype.kind in "fiu" and not masked:
         return np.array(values, dtype=np.float64)
-    cells = values.tolist() if values.dtype.kind in "OUS" else list(values)
+    cells = values.tolist() if masked or values.dtype.kind in "OUS" else list(values)
     if set(map(type, cells)) <= _PLAIN:
         with contextlib.suppress(OverflowError):
             return np.array(cells, dtype=np.float64)
@@ -148,7 +132,7 @@ def _of_cells(cells: list[Any], name: str) -> Array:
     for row, cell in enumerate(plain):
         if isinstance(cell, str):
             if not is_number(cell, decimal=decimal):
-                raise CellError(row, f"'{cell:.40}' in column '{name}' is not a number")
+                raise RowError(row, f"'{cell:.40}' in column '{name}' is not a number")
             cell = cell.replace(decimal, ".")
         found[row] = float(cell)
     return found
@@ -253,7 +237,7 @@ def as_ticks(values: Values, reader: StampReader) -> Ticks:
 
     Raises
     ------
-    StampError
+    RowError
         At a value that is no stamp like the first.
     """
     if values.dtype.kind in "Mm":
@@ -301,13 +285,19 @@ class MemorySource:
         matrices: bool = False,
         units: Sequence[str] = (),
     ) -> None:
-        self.what = what
-        self.names = names
-        self.units = list(units)
-        self.has_header = has_header
-        self.matrices = matrices
-        self._columns = columns
-        self._zoned = zoned
+        for name, column in zip(names, columns, strict=True):
+            if column.ndim != 1:
+                raise InputError(
+                    f"{what}: column '{name}' has {column.ndim} axes, and has to have one"
+                )
+            if column.size != columns[0].size:
+                raise InputError(
+                    f"{what}: column '{name}' has {column.size} rows, and '{names[0]}' has "
+                    f"{columns[0].size}"
+                )
+        self.what, self.names, self.units = what, names, list(units)
+        self.has_header, self.matrices = has_header, matrices
+        self._columns, self._zoned = columns, zoned
 
     @property
     def rows(self) -> int:
@@ -339,7 +329,7 @@ class MemorySource:
         columns = {at: self._columns[at][taken] for at in used}
         try:
             return self._table(columns, wanted)
-        except (CellError, StampError) as error:
+        except RowError as error:
             raise self.error_in_row(str(error), error.row) from error
 
     def _table(self, columns: Mapping[int, Values], wanted: TableLayout) -> Table:
@@ -408,27 +398,12 @@ def table_in_memory(data: Any) -> MemorySource:
         series = [data.get_column(name) for name in data.columns]
         zoned = {at for at, one in enumerate(series) if getattr(one.dtype, "time_zone", None)}
         columns = [np.asarray(one.to_numpy()) for one in series]
-        return _checked("the DataFrame", list(data.columns), columns, frozenset(zoned))
+        return MemorySource("the DataFrame", list(data.columns), columns, zoned=frozenset(zoned))
     if isinstance(data, Mapping):
         columns = [*map(np.asanyarray, data.values())]  # some may be masked
-        return _checked(what, [str(name) for name in data], columns)
+        return MemorySource(what, [str(name) for name in data], columns)
     lazy = ": collect() it first" if hasattr(data, "collect_schema") else ""
     raise InputError(f"a recording is {TAKEN}; got {type(data).__name__}{lazy}")
-
-
-def _checked(
-    what: str, names: list[str], columns: list[Values], zoned: frozenset[int] = frozenset()
-) -> MemorySource:
-    """Return a table whose columns have one length."""
-    for name, column in zip(names, columns, strict=True):
-        if column.ndim != 1:
-            raise InputError(f"{what}: column '{name}' has {column.ndim} axes, and has to have one")
-        if column.size != columns[0].size:
-            raise InputError(
-                f"{what}: column '{name}' has {column.size} rows, and '{names[0]}' has "
-                f"{columns[0].size}"
-            )
-    return MemorySource(what, names, columns, zoned=zoned)
 
 
 def _of_array(data: Values) -> MemorySource:
@@ -455,7 +430,7 @@ def _of_pandas(frame: Any) -> MemorySource:
             columns.append(index.to_series())
     zoned = frozenset(at for at, one in enumerate(columns) if getattr(one.dtype, "tz", None))
     values = [_of_series(one) for one in columns]
-    return _checked("the DataFrame", names, values, zoned)
+    return MemorySource("the DataFrame", names, values, zoned=zoned)
 
 
 def _of_series(series: Any) -> Values:

@@ -58,8 +58,8 @@ _UNCLEAR: Final = re.compile(
 """Dates and times that can be read in more than one way."""
 
 
-class StampError(ValueError):
-    """Raised by a text that is no time stamp like those before it."""
+class RowError(ValueError):
+    """Raised by a value that is not of the kind that its column has to be of."""
 
     def __init__(self, row: int, reason: str) -> None:
         super().__init__(reason)
@@ -128,19 +128,14 @@ class StampReader:
 
         Raises
         ------
-        StampError
+        RowError
             At a text that is no stamp, or of another kind than the first.
         """
-        # One long text would make an array as wide as it of all.
-        # A time stamp has some 40 characters at most.
-        if (longest := max(map(len, texts), default=0)) > 200:
-            row = next(row for row, text in enumerate(texts) if len(text) == longest)
-            raise StampError(row, f"'{texts[row]:.40}…' is no time stamp")
-        try:
-            ascii_texts = np.asarray(texts, dtype=object).astype("S")
-        except UnicodeEncodeError:
-            row = next(row for row, text in enumerate(texts) if not str(text).isascii())
-            raise StampError(row, f"'{texts[row]:.40}' is no time stamp") from None
+        # One long text would make an array as wide as it of all; a time stamp has some 40 letters.
+        wrong = (row for row, text in enumerate(texts) if len(text) > 200 or not text.isascii())
+        if (row := next(wrong, None)) is not None:
+            raise RowError(row, f"'{texts[row]:.40}' is no time stamp")
+        ascii_texts = np.asarray(texts, dtype=object).astype("S")
         found = np.full(ascii_texts.size, NO_TIME, dtype=np.int64)
         for rows in _of_one_shape(ascii_texts):
             first = ascii_texts[rows[0]].decode()
@@ -153,16 +148,16 @@ class StampReader:
         """Return the parts of a stamp that is like those before it."""
         match = _match(text)
         if match is None:
-            raise StampError(row, f"'{text:.40}' is no time stamp{how_to_write(text)}")
+            raise RowError(row, f"'{text:.40}' is no time stamp{how_to_write(text)}")
         kind = _kind(match)
         zoned = match.groupdict().get("zone") is not None
         if not self.kind:
             self.kind, self.zoned = kind, zoned
         if kind != self.kind:
-            raise StampError(row, f"'{text}' is a {kind}, and the first time is a {self.kind}")
+            raise RowError(row, f"'{text}' is a {kind}, and the first time is a {self.kind}")
         if zoned != self.zoned:
             other, own = ("no zone", "a zone") if self.zoned else ("a zone", "no zone")
-            raise StampError(row, f"'{text}' has {other}, and the first time has {own}")
+            raise RowError(row, f"'{text}' has {other}, and the first time has {own}")
         return match
 
 
@@ -203,23 +198,20 @@ def _nanoseconds(texts: Texts, match: re.Match[str], rows: Integers) -> Ticks:
     """Return the nanoseconds of texts whose parts stand at the places of those of the first."""
     letters = texts.view(np.uint8).reshape(texts.size, -1)
 
-    def part(name: str) -> Ticks:
-        start, stop = match.span(name) if name in match.re.groupindex else (-1, -1)
+    def part(name: str, digits: int = 0) -> Ticks:
+        # Decimals of a second beyond nine are left out.
+        places = range(*match.span(name))[:9] if name in match.re.groupindex else range(0)
         number = np.zeros(texts.size, dtype=np.int64)
-        for place in range(max(start, 0), max(stop, 0)):
+        for place in places:
             number = 10 * number + (letters[:, place] - np.int64(ord("0")))
-        return number
+        return np.asarray(number * 10 ** max(digits - len(places), 0))
 
-    ticks: Ticks
     hour, minute, second = (part(name) for name in ("hour", "minute", "second"))
     wrong = (minute > 59) | (second > 59)
     if "half" in match.re.groupindex:
         wrong |= (hour < 1) | (hour > 12)
         hour = hour % 12 + (12 if match["half"] in "Pp" else 0)
-    ticks = SECOND_NS * (second + 60 * (minute + 60 * hour))
-    if match.groupdict().get("fraction") is not None:  # decimals beyond nine are left out
-        for weight, place in enumerate(range(*match.span("fraction"))[:9]):
-            ticks += 10 ** (8 - weight) * (letters[:, place] - np.int64(ord("0")))
+    ticks: Ticks = SECOND_NS * (second + 60 * (minute + 60 * hour)) + part("fraction", 9)
     if _kind(match) == MOMENT:
         days, no_day = _days(part("year"), part("month"), part("day"))
         offset = 60 * (part("zone_minute") + 60 * part("zone_hour"))
@@ -230,7 +222,7 @@ def _nanoseconds(texts: Texts, match: re.Match[str], rows: Integers) -> Ticks:
         ticks -= SECOND_NS * offset * (-1 if zone.startswith("-") else 1)
     if wrong.any():
         at = int(np.argmax(wrong))
-        raise StampError(int(rows[at]), f"'{texts[at].decode()}' is not a valid date and time")
+        raise RowError(int(rows[at]), f"'{texts[at].decode()}' is not a valid date and time")
     return ticks
 
 
@@ -268,7 +260,7 @@ def clock_of_stamps(columns: list[Ticks], origin: int | None) -> tuple[Floats, i
 
     Raises
     ------
-    StampError
+    RowError
         When a date has its own time of day and times have a column of their own.
 
     Examples
@@ -280,7 +272,7 @@ def clock_of_stamps(columns: list[Ticks], origin: int | None) -> tuple[Floats, i
         late = (columns[0] != NO_TIME) & (columns[0] % DAY_NS != 0)
         if late.any():
             row = int(np.argmax(late))
-            raise StampError(row, "a date has a time itself, and times have a column of their own")
+            raise RowError(row, "a date has a time itself, and times have a column of their own")
     known = np.all([ticks != NO_TIME for ticks in columns], axis=0)
     total = np.sum(columns, axis=0, where=known[None, :])
     if origin is None and known.any():
@@ -320,17 +312,13 @@ def count_days(bodies: list[RawBody], clock: Array, codes: Codes | None) -> list
         Index of each row's body, in the order of the bodies; None: all share the clock.
     """
     if codes is None or len(bodies) == 1:
+        clocks = [counted_on(clock, DAY_NS)] * len(bodies)
+    elif int((codes[1:] != codes[:-1]).sum()) < len(bodies):
+        clocks = [counted_on(body.clock, DAY_NS) for body in bodies]
+    else:
         counted = counted_on(clock, DAY_NS)
-        return [replace(body, clock=counted) for body in bodies]
-    turns = int((codes[1:] != codes[:-1]).sum())
-    if turns < len(bodies):
-        return [replace(body, clock=counted_on(body.clock, DAY_NS)) for body in bodies]
-    counted = counted_on(clock, DAY_NS)
-    present = np.unique(codes)
-    return [
-        replace(body, clock=counted[codes == code])
-        for body, code in zip(bodies, present, strict=True)
-    ]
+        clocks = [counted[codes == code] for code in np.unique(codes)]
+    return [replace(body, clock=own) for body, own in zip(bodies, clocks, strict=True)]
 
 
 def counted_on(clock: Array, period: float) -> Array:

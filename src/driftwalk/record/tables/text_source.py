@@ -295,6 +295,8 @@ def _holds_positions(
 class TextSource:
     """A table in a text file, whose header is found or, by a layout, known."""
 
+    matrices = False
+
     def __init__(self, path: Path, options: ReadOptions, layout: TableLayout | None = None) -> None:
         self._path, self._advice = path, ""
         self.units: list[str] = []
