@@ -13,14 +13,6 @@ from driftwalk.record.vocabulary import ALLOWED, IMAGE_WORDS, NO_UNIT, ROOTS, UN
 QUATERNION: Final = ("qx", "qy", "qz", "qw")
 OF_BODY: Final = ("x", "y", "z", "theta", *QUATERNION, "lon", "lat", "confidence")
 """Quantities that a table may have once for each body."""
-_QUATERNION_WORDS: Final = words("quaternion")
-_FRAME_WORDS: Final = words("frame")
-_FIRST: Final = words("first")
-_WITH_ID: Final = words("with_id")
-_INNER: Final = words("inner")
-_NO_POSITION: Final = words("no_position")
-_DIRECTIONS: Final = words("directions")
-_TIME_WORDS: Final = words("time")
 _P = re.compile(r"[pP]\d*")
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 _JOINED = re.compile(r"(position|cent(?:er|re|roid)|head|nose|tail)([xy])\b", re.IGNORECASE)
@@ -95,27 +87,34 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     rest = [token for position, token in enumerate(tokens) if position != index]
     lower = {token.lower() for token in rest}
     root = tokens[index].lower()
-    allowed = IMAGE_WORDS | _TIME_WORDS | {"id"} | (_WITH_ID if root == "id" else frozenset())
+    with_id = words("with_id") if root == "id" else frozenset()
+    allowed = IMAGE_WORDS | words("time") | {"id"} | with_id
     allowed |= {word.lower() for word in words_of(text.rpartition(": ")[0])}  # "Latest: Time"
     if quantity not in OF_BODY and lower - allowed - ({"date"} if quantity == "t" else set()):
         return None
-    if quantity in OF_BODY and lower & _NO_POSITION:
+    if quantity in OF_BODY and lower & words("no_position"):
         return None
-    if quantity in ("x", "y", "z") and lower & _DIRECTIONS and not unit:
+    if quantity in ("x", "y", "z") and lower & words("directions") and not unit:
         return None
     if (unit and unit not in ALLOWED[quantity]) or (unknown and not ALLOWED[quantity]):
         return None
     image = lower & IMAGE_WORDS
-    names = [token for token in rest if token.lower() not in IMAGE_WORDS | _FRAME_WORDS]
+    names = [token for token in rest if token.lower() not in IMAGE_WORDS | words("frame")]
     return ColumnMeaning(
         quantity=quantity,
         unit=unit or ("s" if root == "seconds" else ""),
         body="_".join([*names, number] if number else names) if quantity in OF_BODY else "",
         bare=not image and root.rstrip("0123456789") in ("x", "y", "z", "theta", "t"),
         unknown=unknown,
-        rank=1 if root in _FIRST and not lower - _FRAME_WORDS - {"id"} else 2,
+        rank=1 if root in words("first") and not lower - words("frame") - {"id"} else 2,
         ending=tokens[-1] if not unit and tokens[-1] in names else "",
     )
+
+
+def quantity_of(name: str) -> str:
+    """Return the quantity of a column of that name, ``""`` when the name says nothing known."""
+    meaning = column_meaning(name)
+    return "" if meaning is None else meaning.quantity
 
 
 def _quantity(tokens: list[str]) -> tuple[int, str, str]:
@@ -149,7 +148,7 @@ def _inner_unit(tokens: list[str], index: int, quantity: str) -> int | None:
     for at, token in enumerate(tokens):
         word = token.lower()
         after = word == "m" and at == index + 1 < len(tokens) - 1
-        if (word in _INNER or after) and UNITS[word] in ALLOWED[quantity]:
+        if (word in words("inner") or after) and UNITS[word] in ALLOWED[quantity]:
             return at
     return None
 
@@ -174,7 +173,7 @@ def _stamp(tokens: list[str], unit: str) -> ColumnMeaning | None:
 def _join_quaternion(tokens: list[str]) -> list[str]:
     """Return the words of a name with those of a part of a quaternion as one."""
     for at, (first, second) in enumerate(pairwise(tokens)):
-        if first.lower() in _QUATERNION_WORDS and second.lower() in ("x", "y", "z", "w"):
+        if first.lower() in words("quaternion") and second.lower() in ("x", "y", "z", "w"):
             return [*tokens[:at], f"q{second.lower()}", *tokens[at + 2 :]]
     return tokens
 
@@ -202,8 +201,7 @@ def split_brackets(name: str) -> tuple[str, str]:
 
 def _root(token: str) -> tuple[str, str]:
     """Return (quantity, number of the body) of one word, ("", "") when it is none."""
-    match = re.fullmatch(r"(.*?)(\d*)", token.lower())
-    stem, number = match.groups() if match else (token.lower(), "")
+    stem, number, _ = re.split(r"(\d*)$", token.lower(), maxsplit=1)
     quantity = ROOTS.get(stem, "")
     if number and quantity not in OF_BODY:
         return "", ""

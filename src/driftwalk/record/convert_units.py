@@ -5,7 +5,6 @@ The resolution of a file's numbers is found here too.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from fractions import Fraction
 
 import numpy as np
@@ -52,12 +51,6 @@ def detect_quantum(values: Array) -> float:
     decimal = _decimal_quantum(known)
     coarse = _lattice_quantum(known, decimal)
     return coarse if coarse > 0.0 else decimal
-
-
-def common_quantum(series: Iterable[Array]) -> float:
-    """Return the finest resolution among coordinates that vary, 0 when one has none."""
-    found = [detect_quantum(values) for values in series if span_of([values]) > 0.0]
-    return min(found, default=0.0)
 
 
 def _decimal_quantum(values: Array) -> float:
@@ -142,7 +135,9 @@ def convert_units(
     refuse_far(raw.bodies, scale)
     positions = y_axis or raw.y_axis or ("down" if in_pixels else "up")
     flip, flip_theta = positions == "down", (y_axis or raw.theta_axis or positions) == "down"
-    quantum = common_quantum(values for body in raw.bodies[:4] for values in (body.x, body.y))
+    # The finest resolution among coordinates that vary.
+    series = (values for body in raw.bodies[:4] for values in (body.x, body.y))
+    quantum = min((detect_quantum(one) for one in series if span_of([one]) > 0.0), default=0.0)
     attrs: dict[str, object] = dict(raw.attrs)
     negated = _describe_negated(raw, flip, flip_theta)
     attrs["y_axis"] = f"{raw.plane}; {negated}" if raw.plane else negated

@@ -9,6 +9,7 @@ when a block fails is it read again line by line, to say which line and column i
 from __future__ import annotations
 
 import codecs
+import contextlib
 import gzip
 import io
 import re
@@ -54,19 +55,12 @@ def other_encoding(start: bytes) -> str | None:
         return UTF16
     if start.isascii() or _NO_TEXT.search(start):
         return None
-    try:
-        start.decode("utf-8")
-    except UnicodeDecodeError as error:
-        # A letter of UTF-8 has four bytes at most, and may be cut.
-        if error.start >= len(start) - 4 and error.reason == "unexpected end of data":
-            return None
-    else:
-        return None
-    try:
-        start.decode(_CODECS[WINDOWS])
-    except UnicodeDecodeError:
-        return None
-    return WINDOWS
+    for encoding, codec in ((None, "utf-8"), (WINDOWS, _CODECS[WINDOWS])):
+        # Not as a whole: its last letter may be cut.
+        with contextlib.suppress(UnicodeDecodeError):
+            codecs.getincrementaldecoder(codec)().decode(start)
+            return encoding
+    return None
 
 
 class TranscodedText(io.RawIOBase):
@@ -322,7 +316,7 @@ class _Collected:
             codes={at: joined[at] for at in self._labels},
             labels={column: list(seen) for column, seen in self._labels.items()},
             clock_origin=self._origin or 0,
-            calendar=calendar_of(list(self._stamps.values())),
+            calendar=calendar_of([*self._stamps.values()]),
         )
 
     def _parsed(self, block: bytes, line: int) -> Any:

@@ -6,6 +6,7 @@ They stand in ``vocabulary.toml``, by language and use.
 from __future__ import annotations
 
 import tomllib
+from functools import cache
 from importlib.resources import files
 from typing import Any, Final
 
@@ -14,6 +15,7 @@ _FILE: Final[dict[str, Any]] = tomllib.loads(
 )
 
 
+@cache
 def words(name: str) -> frozenset[str]:
     """Return the words of one of the lists."""
     return frozenset(_FILE["lists"][name].split())
@@ -42,6 +44,7 @@ VARIANTS: Final = words("variants")
 FRONT: Final = words("front")
 REAR: Final = words("rear")
 MIDDLE: Final = words("middle") | {""}
+PARTS: Final = MIDDLE | FRONT | REAR
 BOXES: Final = _meanings("sides_of_a_box") | {
     f"{prefix}{side}": side for prefix in ("bbox", "bb", "box") for side in _FILE["sides_of_a_box"]
 }

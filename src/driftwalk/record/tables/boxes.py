@@ -27,8 +27,6 @@ _CORNERS: Final = ("x1", "y1", "x2", "y2")
 _QUAD: Final = tuple(f"{axis}{corner}" for corner in range(1, 5) for axis in "xy")
 _FROM_ZERO: Final = {"x0": "x1", "y0": "y1", "x1": "x2", "y1": "y2"}
 _OF_QUAD: Final = re.compile(r"(?:tag)?(?:c|corner|p|pt)([0-4])([xy])")
-_CENTRE: Final = words("centre")
-_CLASSES: Final = words("classes")
 
 
 class BoxPolicy(NamedTuple):
@@ -104,10 +102,9 @@ def find_box(
         return _stated("xywh", found, units)
     if not {"x", "y", "w", "h"} <= set(found):
         return None
-    said = {word.lower() for side in "xy" for word in words_of(source.names[found[side]])}
-    if said & _CENTRE:
-        return _stated("cxcywh", found, units)
     names = [source.names[found[side]] for side in ("x", "y", "w", "h")]
+    if {word.lower() for name in names[:2] for word in words_of(name)} & words("centre"):
+        return _stated("cxcywh", found, units)
     raise InputError(
         f"the columns {listed([repr(name) for name in names])} are a box, and nothing says "
         'whether x and y are its corner or its centre: add `box="xywh"` if they are the corner '
@@ -154,21 +151,16 @@ def _sides(
 
 def _stated(form: str, found: Mapping[str, int], units: Mapping[str, str]) -> Box:
     """Return the box of a form, or say which columns it lacks."""
-    sides: tuple[str, ...] = _CORNERS
-    if form != "xyxy":
-        corner = "x1" in found and "x" not in found
-        sides = ("x1", "y1", "w", "h") if corner else ("x", "y", "w", "h")
+    names = sides = _CORNERS if form == "xyxy" else ("x", "y", "w", "h")
+    if form != "xyxy" and "x1" in found and "x" not in found:
+        sides = ("x1", "y1", "w", "h")
     missing = [side for side in sides if side not in found]
     if missing:
         wanted = argument_text("columns", dict.fromkeys(sides, "NAME"))
         raise InputError(f"a box of the form '{form}' has no column of {listed(missing)}: {wanted}")
-    names = dict(zip(sides, _CORNERS if form == "xyxy" else ("x", "y", "w", "h"), strict=True))
-    return Box(
-        form,
-        {names[side]: found[side] for side in sides},
-        [units[side] for side in sides],
-        tuple(found[side] for side in sides if side not in ("x", "y")),
-    )
+    columns = {name: found[side] for name, side in zip(names, sides, strict=True)}
+    replaced = tuple(found[side] for side in sides if side not in ("x", "y"))
+    return Box(form, columns, [units[side] for side in sides], replaced)
 
 
 def _corners(
@@ -187,11 +179,10 @@ def _corners(
         or any(one.quantity == "theta" and one.body in numbered for one in meanings.values())
     ):
         return None
-    if not plain and not {"x", "y"} <= set(found):
-        return box
     centre = {"x", "y"} <= set(found)
-    sides = (*_CORNERS, *("xy" if centre else ""))
-    values = _values(source, [found[side] for side in sides])
+    if not plain and not centre:
+        return box
+    values = _values(source, [found[side] for side in (*_CORNERS, *("xy" if centre else ""))])
     if values is None:
         return None
     x1, y1, x2, y2 = values[:4]
@@ -205,9 +196,8 @@ def _corners(
     ways = max(np.ptp(x1 + x2), np.ptp(y1 + y2)) / 2.0
     compact = max(np.ptp(x2 - x1), np.ptp(y2 - y1)) <= BOX.spread * ways
     joined = {"".join(words_of(name)).lower() for name in source.names}
-    of_detector = bool(joined & _CLASSES) or any(
-        one.quantity == "confidence" for one in meanings.values()
-    )
+    confident = any(one.quantity == "confidence" for one in meanings.values())
+    of_detector = bool(joined & words("classes")) or confident
     if not compact and not of_detector:
         return None
     names = listed([repr(source.names[found[side]]) for side in _CORNERS])
@@ -216,7 +206,7 @@ def _corners(
             f"{names} are read as the corners of a box, whose centre is the body: add "
             '`box="none"` if they are two bodies'
         )
-        return Box(box.form, box.sides, box.units, box.replaced, notes=(note,))
+        return replace(box, notes=(note,))
     raise InputError(
         f"{names} may be the corners of a box (the second is always beyond the first) or two "
         'bodies: add `box="xyxy"` or `box="none"`'

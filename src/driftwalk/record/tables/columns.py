@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from typing import Final
 
@@ -20,7 +21,7 @@ from driftwalk.record.tables.named_columns import (
     shown,
 )
 from driftwalk.record.tables.stamps import OF_DAY
-from driftwalk.record.vocabulary import ALLOWED, FRONT, LENGTHS, MIDDLE, REAR
+from driftwalk.record.vocabulary import ALLOWED, FRONT, LENGTHS, MIDDLE, PARTS, REAR
 
 _ON_GLOBE: Final = ("lon", "lat")
 
@@ -91,8 +92,7 @@ class _Reader(NamedColumns):
         }
         box = self.result.box
         if box is not None and (not bodies or not {"x", "y"} <= set(box.sides)):
-            name = next((body for body in bodies if not body), "")
-            bodies = {name: {**places.get(name, {}), **box.sides}}
+            bodies = {"": {**places.get("", {}), **box.sides}}
         elif box is not None:
             if len(bodies) > 1:
                 raise InputError(
@@ -127,20 +127,15 @@ class _Reader(NamedColumns):
 
     def _turned(self) -> set[str]:
         """Return bodies with a quaternion and no angle; half of a chosen quaternion is refused."""
-        quantities: dict[str, list[str]] = {}
-        for one in self.meanings.values():
-            quantities.setdefault(one.body, []).append(one.quantity)
-        whole = {
-            body
-            for body, own in quantities.items()
-            if all(own.count(part) == 1 for part in QUATERNION)
-        }
-        if any(part in self.chosen for part in QUATERNION) and len(whole) < len(quantities):
+        counts = Counter((one.body, one.quantity) for one in self.meanings.values())
+        bodies = {body for body, _ in counts}
+        whole = {one for one in bodies if all(counts[one, part] == 1 for part in QUATERNION)}
+        if any(part in self.chosen for part in QUATERNION) and whole != bodies:
             raise InputError(
                 'an orientation in space has four parts: name each with `columns={"qx": "NAME"}`, '
                 "qy, qz and qw"
             )
-        return {body for body in whole if "theta" not in quantities[body]}
+        return {body for body in whole if not counts[body, "theta"]}
 
     def _add_loose_angle(
         self, only: dict[str, int], places: dict[str, dict[str, int]], bodies: set[str]
@@ -169,13 +164,12 @@ class _Reader(NamedColumns):
         """Find the middle and the front of one body among bodies that are its parts."""
         bodies = self.result.bodies
         lower = {body.lower(): body for body in bodies}
-        if len(lower) < 2 or set(lower) - MIDDLE - FRONT - REAR or self.options.heading is not None:
+        turned = any("theta" in one for one in bodies.values())
+        if len(lower) < 2 or set(lower) - PARTS or self.options.heading is not None or turned:
             return
         middle = [body for name, body in lower.items() if name in MIDDLE]
         front = [body for name, body in lower.items() if name in FRONT]
         rear = [body for name, body in lower.items() if name in REAR]
-        if any("theta" in one for one in bodies.values()):
-            return
         if len(middle) == 1 and len(front or rear) == 1:
             other, what = (front[0], "front") if front else (rear[0], "rear")
             start, end = (middle[0], other) if front else (other, middle[0])
@@ -207,19 +201,18 @@ class _Reader(NamedColumns):
 
     def _single(self, quantity: str) -> int | None:
         """Return the column of a quantity that a table has once, None where there is none."""
-        found = [(one.rank, at) for at, one in self.meanings.items() if one.quantity == quantity]
-        if not found:
+        own = [(one.rank, at) for at, one in self.meanings.items() if one.quantity == quantity]
+        if not own:
             return None
-        found.sort()
-        rank, at = found[0]
-        rivals = [other for other_rank, other in found[1:] if other_rank == rank]
+        (rank, at), *others = sorted(own)
+        rivals = [other for other_rank, other in others if other_rank == rank]
         alike = rank > 1 and (
             self.lenient or (quantity == "t" and rivals and self._run_together(at, rivals[0]))
         )
         if rivals and not alike:
             raise InputError(self.both(at, rivals[0], quantity))
         name = self.result.columns[at].name
-        self.drop((other for _, other in found[1:]), f"'{name}' is read as {quantity} instead")
+        self.drop((other for _, other in others), f"'{name}' is read as {quantity} instead")
         return at
 
     def _run_together(self, first: int, second: int) -> bool:
@@ -236,8 +229,7 @@ class _Reader(NamedColumns):
     def _find_clock(self) -> None:
         """Find the clock: frames, numbers, seconds and their fraction, or time stamps."""
         result, source = self.result, self.source
-        frame, time, part = (self._single(quantity) for quantity in ("frame", "t", "t+"))
-        date = self._single("date")
+        frame, time, part, date = map(self._single, ("frame", "t", "t+", "date"))
         if time is None and part is not None:
             time, part = part, None
             self.meanings[time] = replace(self.meanings[time], quantity="t")
@@ -289,9 +281,8 @@ class _Reader(NamedColumns):
     def _find_units(self) -> None:
         result = self.result
         used = {at for one in result.bodies.values() for at in one.values()}
-        lengths = {at: one for at, one in self.meanings.items() if one.quantity in tuple("xyz")}
-        wanted = [one for at, one in lengths.items() if at in used]
-        units = {at: one.unit for at, one in lengths.items() if at in used}
+        wanted = {at: one for at, one in self.meanings.items() if at in used}
+        units = {at: one.unit for at, one in wanted.items() if one.quantity in tuple("xyz")}
         if result.box is not None:
             units |= dict(zip(result.box.sides.values(), result.box.units, strict=False))
         if result.box is not None and result.box.image is not None:
@@ -306,10 +297,10 @@ class _Reader(NamedColumns):
             result.factors = {at: factor for at, factor in factors.items() if factor != 1.0}
         else:
             result.length_unit = _agreed(list(units.values()), "positions", "x")
-        angles = {at: one.unit for at, one in self.meanings.items() if one.quantity == "theta"}
-        known = [unit for at, unit in angles.items() if at in used]
+        known = [one.unit for one in wanted.values() if one.quantity == "theta"]
         result.angle_unit = _agreed(known, "angles", "theta")
-        result.bare = all(one.bare for one in wanted) and (result.box is None or bool(wanted))
+        lengths = [one for one in wanted.values() if one.quantity in tuple("xyz")]
+        result.bare = all(one.bare for one in lengths) and (result.box is None or bool(lengths))
 
     def _describe(self) -> None:
         """Write down what each column was taken for."""

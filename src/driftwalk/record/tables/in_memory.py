@@ -10,6 +10,7 @@ import datetime
 import math
 import numbers
 from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
@@ -81,8 +82,6 @@ class TableSource(Protocol):
 Values = npt.NDArray[Any]
 
 _PLAIN: Final = frozenset({int, float, type(None)})
-_MOMENTS: Final = (datetime.datetime, datetime.date, np.datetime64)
-_TIMES: Final = (datetime.time, datetime.timedelta, np.timedelta64)
 
 
 def objects(cells: Sequence[Any]) -> Values:
@@ -220,8 +219,8 @@ def form_of(values: Values) -> StampForm | None:
         # A workbook has no dates without a time: they are those of midnight.
         midnight = not isinstance(cell, datetime.datetime) or cell.time() == datetime.time()
         return StampForm(MOMENT, has_time=not midnight)
-    if isinstance(cell, (*_MOMENTS, *_TIMES)):
-        return StampForm(MOMENT if isinstance(cell, _MOMENTS) else OF_DAY)
+    if isinstance(cell, (np.datetime64, np.timedelta64, datetime.time, datetime.timedelta)):
+        return StampForm(MOMENT if isinstance(cell, np.datetime64) else OF_DAY)
     return stamp_form(text_of_cell(cell))
 
 
@@ -242,83 +241,59 @@ def as_ticks(values: Values, reader: StampReader) -> Ticks:
     """
     if values.dtype.kind in "Mm":
         reader.kind = MOMENT if values.dtype.kind == "M" else OF_DAY
-        unit = "datetime64[ns]" if values.dtype.kind == "M" else "timedelta64[ns]"
         # Where NumPy has no time its nanoseconds are those of `NO_TIME`.
-        ticks: Ticks = values.astype(unit).astype(np.int64)
-        return ticks
-    texts = np.array([text_of_cell(cell) for cell in values.tolist()], dtype=object)
-    return reader.read(texts)
+        return np.asarray(values.astype(f"{values.dtype.kind}8[ns]").astype(np.int64))
+    return reader.read(objects([text_of_cell(cell) for cell in values.tolist()]))
 
 
 TAKEN: Final = "a path, a DataFrame of pandas or polars, an array or a mapping of columns"
 
 
+@dataclass
 class MemorySource:
-    """A table whose columns are arrays; none of them is changed.
+    """A table whose columns are arrays; none of them is changed."""
 
-    Parameters
-    ----------
-    what : str
-        The table in words, for errors.
-    names : list of str
-        Names of its columns.
-    columns : list of array, shape (n,)
-        Their values.
-    has_header : bool
-        Whether the columns have names.
-    zoned : set of int
-        Columns of times of NumPy that are in UTC.
-    matrices : bool
-        Whether numbers after x and y count the columns of matrices, each of which is a body.
-    units : sequence of str
-        Their units; empty where none are known.
-    """
+    what: str
+    """The table in words, for errors."""
+    names: list[str]
+    """Names of its columns."""
+    columns: list[Values]
+    """Their values, each of shape (n,)."""
+    _: KW_ONLY
+    has_header: bool = True
+    """Whether the columns have names."""
+    zoned: frozenset[int] = frozenset()
+    """Columns of times of NumPy that are in UTC."""
+    matrices: bool = False
+    """Whether numbers after x and y count the columns of matrices, each of which is a body."""
+    units: list[str] = field(default_factory=list)
+    """Their units; empty where none are known."""
 
-    def __init__(
-        self,
-        what: str,
-        names: list[str],
-        columns: list[Values],
-        *,
-        has_header: bool = True,
-        zoned: frozenset[int] = frozenset(),
-        matrices: bool = False,
-        units: Sequence[str] = (),
-    ) -> None:
-        for name, column in zip(names, columns, strict=True):
+    def __post_init__(self) -> None:
+        for name, column in zip(self.names, self.columns, strict=True):
+            where = f"{self.what}: column '{name}'"
             if column.ndim != 1:
-                raise InputError(
-                    f"{what}: column '{name}' has {column.ndim} axes, and has to have one"
-                )
-            if column.size != columns[0].size:
-                raise InputError(
-                    f"{what}: column '{name}' has {column.size} rows, and '{names[0]}' has "
-                    f"{columns[0].size}"
-                )
-        self.what, self.names, self.units = what, names, list(units)
-        self.has_header, self.matrices = has_header, matrices
-        self._columns, self._zoned = columns, zoned
+                raise InputError(f"{where} has {column.ndim} axes, and has to have one")
+            if column.size != self.columns[0].size:
+                first = f"'{self.names[0]}' has {self.columns[0].size}"
+                raise InputError(f"{where} has {column.size} rows, and {first}")
 
     @property
     def rows(self) -> int:
         """Number of samples."""
-        return self._columns[0].size if self._columns else 0
-
-    def column(self, at: int) -> Values:
-        """Return the values of a column, which must not be changed."""
-        return self._columns[at]
+        return self.columns[0].size if self.columns else 0
 
     def sample(self) -> list[list[str]]:
         """Return the first rows as texts."""
         texts = [
             [text_of_cell(cell) for cell in column[: TABLE.sample_rows].tolist()]
-            for column in self._columns
+            for column in self.columns
         ]
         return [list(row) for row in zip(*texts, strict=True)]
 
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
-        return form_of(self._columns[column])
+        return form_of(self.columns[column])
 
     def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
         """Read columns."""
@@ -326,7 +301,7 @@ class MemorySource:
             raise self.error("holds no rows of data")
         taken = slice(TABLE.first_rows if head else None)
         used = {*wanted.numbers, *wanted.texts, *wanted.stamps}
-        columns = {at: self._columns[at][taken] for at in used}
+        columns = {at: self.columns[at][taken] for at in used}
         try:
             return self._table(columns, wanted)
         except RowError as error:
@@ -345,7 +320,7 @@ class MemorySource:
             readers = {at: StampReader() for at in wanted.stamps}
             ticks = [as_ticks(columns[at], reader) for at, reader in readers.items()]
             for at, reader in readers.items():
-                reader.zoned |= at in self._zoned
+                reader.zoned |= at in self.zoned
             numbers[wanted.stamps[0]], first = clock_of_stamps(ticks, None)
             origin, calendar = first or 0, calendar_of([*readers.values()])
         return Table(
@@ -391,7 +366,12 @@ def table_in_memory(data: Any) -> MemorySource:
     if isinstance(data, np.ndarray) and data.dtype.names is not None:
         what, data = "the structured array", {name: data[name] for name in data.dtype.names}
     if isinstance(data, np.ndarray):
-        return _of_array(data)
+        if data.ndim != 2:
+            raise InputError(
+                "an array has a row per sample and a column per quantity, and this one has the "
+                f"shape {data.shape}: separate columns go into a mapping of names to columns"
+            )
+        return MemorySource("the array", [""] * data.shape[1], [*data.T], has_header=False)
     if hasattr(data, "iloc") and hasattr(data, "columns"):
         return _of_pandas(data)
     if hasattr(data, "get_column") and hasattr(data, "columns"):
@@ -404,16 +384,6 @@ def table_in_memory(data: Any) -> MemorySource:
         return MemorySource(what, [str(name) for name in data], columns)
     lazy = ": collect() it first" if hasattr(data, "collect_schema") else ""
     raise InputError(f"a recording is {TAKEN}; got {type(data).__name__}{lazy}")
-
-
-def _of_array(data: Values) -> MemorySource:
-    if data.ndim != 2:
-        raise InputError(
-            "an array has a row per sample and a column per quantity, and this one has the shape "
-            f"{data.shape}: separate columns go into a mapping of names to columns"
-        )
-    columns = [data[:, at] for at in range(data.shape[1])]
-    return MemorySource("the array", [""] * len(columns), columns, has_header=False)
 
 
 def _of_pandas(frame: Any) -> MemorySource:

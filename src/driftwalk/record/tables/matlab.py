@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, damaged_as
-from driftwalk.record.column_names import column_meaning
+from driftwalk.record.column_names import quantity_of
 from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
 from driftwalk.record.tables.in_memory import MemorySource, Values, objects
 from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, read_old, refuse_many
@@ -233,8 +233,7 @@ def _table(value: Value, what: str) -> MemorySource | None:
         # There are more samples than quantities, whichever way they lie.
         rows = value if value.shape[0] >= value.shape[1] else value.T
         _refuse_wide(rows.shape[1], what)
-        columns = [rows[:, at] for at in range(rows.shape[1])]
-        return MemorySource(what, [""] * len(columns), columns, has_header=False)
+        return MemorySource(what, [""] * rows.shape[1], [*rows.T], has_header=False)
     return None
 
 
@@ -248,8 +247,7 @@ def _of_fields(fields: dict[str, Value], what: str) -> MemorySource | None:
     matrices = False
     for name, value in fields.items():
         several = isinstance(value, np.ndarray) and min(value.shape) > 1
-        meaning = column_meaning(name)
-        if several and (meaning is None or meaning.quantity not in _OF_BODIES):
+        if several and quantity_of(name) not in _OF_BODIES:
             continue
         for number, column in enumerate(_columns(value, rows), start=1):
             # The number follows the quantity, before a unit.
@@ -273,13 +271,12 @@ def _row_count(fields: dict[str, Value]) -> int | None:
         if (isinstance(value, np.ndarray) and value.ndim == 2 and value.size)
         or (isinstance(value, list) and not elements_of(value))
     }
-    meanings = {name: column_meaning(name) for name in lengths}
-    of_x = [lengths[name] for name, known in meanings.items() if known and known.quantity == "x"]
-    of_t = [lengths[name] for name, known in meanings.items() if known and known.quantity == "t"]
-    if of_t and of_x:
-        return of_t[0]
+    of_x, of_t = (
+        [length for name, length in lengths.items() if quantity_of(name) == wanted]
+        for wanted in ("x", "t")
+    )
     if of_x:
-        return of_x[0]
+        return (of_t or of_x)[0]
     common = Counter(length for length in lengths.values() if length > 1).most_common(1)
     return common[0][0] if common else None
 
@@ -290,12 +287,11 @@ def _columns(value: Value, rows: int) -> list[Values]:
         if len(value) != rows or not all(isinstance(one, str) for one in value):
             return []
         return [objects(value)]
-    if not isinstance(value, np.ndarray) or value.ndim != 2 or rows not in value.shape:
+    if not isinstance(value, np.ndarray) or value.ndim != 2:
         return []
-    if min(value.shape) <= 1:
-        return [value.ravel()]
-    across = value if value.shape[0] == rows else value.T
-    return [across[:, at] for at in range(across.shape[1])]
+    if rows not in (value.shape if min(value.shape) > 1 else (value.size,)):
+        return []
+    return [*(value.T if value.shape[0] == rows else value)]
 
 
 def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
@@ -314,7 +310,8 @@ def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | 
         for at, part in known
     ]
     columns = [
-        np.concatenate([part.column(part.names.index(name)) for _, part in known]) for name in names
+        np.concatenate([part.columns[part.names.index(name)] for _, part in known])
+        for name in names
     ]
     return MemorySource(what, [*names, _BODY], [*columns, np.concatenate(bodies)])
 
@@ -337,11 +334,9 @@ def _single(value: Value) -> Any:
 def _body_name(element: dict[str, Value]) -> str:
     """Return the name of a body, where a field holds it."""
     for name, value in element.items():
-        meaning = column_meaning(name)
-        if meaning is not None and meaning.quantity == _BODY and _is_single(value):
-            single = _single(value)
-            if single is not None:
-                return f"{single:g}" if isinstance(single, float) else str(single)
+        single = _single(value) if quantity_of(name) == _BODY and _is_single(value) else None
+        if single is not None:
+            return f"{single:g}" if isinstance(single, float) else str(single)
     return ""
 
 

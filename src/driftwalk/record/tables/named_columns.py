@@ -11,16 +11,7 @@ from driftwalk.record.column_names import ColumnMeaning, column_meaning, unit_of
 from driftwalk.record.raw import ReadOptions
 from driftwalk.record.tables.boxes import Box
 from driftwalk.record.tables.in_memory import TableSource
-from driftwalk.record.vocabulary import (
-    ALLOWED,
-    FRONT,
-    MIDDLE,
-    REAR,
-    ROOTS,
-    SETPOINTS,
-    UNITS,
-    VARIANTS,
-)
+from driftwalk.record.vocabulary import ALLOWED, PARTS, ROOTS, SETPOINTS, UNITS, VARIANTS
 
 _WORDS: Final = {"t": "time", "t+": "fraction of the time", "frame": "frame number", "w": "width"}
 _WORDS_MORE: Final = {"h": "height", "theta": "orientation", "body": "name of the body"}
@@ -81,6 +72,11 @@ class TableReading:
         """The column whose values are the clock's once the table is read."""
         return next(iter((*self.stamps, *self.numbers)), None)
 
+    @property
+    def confidences(self) -> list[int]:
+        """The columns of confidences that are read."""
+        return sorted({one["confidence"] for one in self.bodies.values() if "confidence" in one})
+
 
 _SKIP: Final = "skip"
 LEFT_OUT: Final = "you left it out"
@@ -122,18 +118,17 @@ class NamedColumns:
                         f"unit of {quantity}"
                     )
                 known = self.meanings.get(index)
-                kept = {
+                stated = self.unit_of(index)
+                inferred = stated if stated in ALLOWED[quantity] else ""
+                unknown = known.unknown if known and not unit and known.quantity == quantity else ""
+                self.meanings = {
                     other: meaning
                     for other, meaning in self.meanings.items()
                     if meaning.quantity != part and other != index
                 }
-                stated = self.unit_of(index)
-                inferred = stated if stated in ALLOWED[quantity] else ""
-                unknown = known.unknown if known and not unit and known.quantity == quantity else ""
-                kept[index] = ColumnMeaning(
+                self.meanings[index] = ColumnMeaning(
                     part, unit or inferred, "", bool(known and known.bare), unknown, rank=-1
                 )
-                self.meanings = kept
                 self.result.columns[index].why = self.options.columns_stated_by
 
     def unit_of(self, at: int) -> str:
@@ -158,14 +153,17 @@ class NamedColumns:
                 f"{argument_text('columns', {quantity: reference})}: unknown quantity; name "
                 f"{', '.join([*ALLOWED, _SKIP])}"
             )
-        with_units = [f"{name} [{unit}]" for name, unit in zip(names, self.below, strict=True)]
-        with_marks = [f"{name} {unit}" for name, unit in zip(names, self.below, strict=True)]
+        pairs = list(zip(names, self.below, strict=True))
+        written = [
+            names,
+            *([form.format(*pair) for pair in pairs] for form in ("{} [{}]", "{} {}")),
+        ]
         for text, unit in ((reference, ""), reference.rpartition(":")[::2]):
-            for known in (names, with_units, with_marks):
-                if text in known:
-                    return known.index(text), UNITS.get(unit.lower(), unit)
-            if text.isdecimal() and 1 <= int(text) <= len(names):
-                return int(text) - 1, UNITS.get(unit.lower(), unit)
+            places = [known.index(text) for known in written if text in known]
+            if not places and text.isdecimal() and 1 <= int(text) <= len(names):
+                places = [int(text) - 1]
+            if places:
+                return places[0], UNITS.get(unit.lower(), unit)
         raise InputError(
             f"{argument_text('columns', {quantity: reference})}: no such column; the file has "
             f"{len(names)}: {shown(names)}"
@@ -216,9 +214,7 @@ class NamedColumns:
 
     def _doubt(self, bodies: set[str]) -> None:
         """Say that pairs next to plain x and y are read as bodies: they may be something else."""
-        others = sorted(
-            body for body in bodies if body and body.lower() not in MIDDLE | FRONT | REAR
-        )
+        others = sorted(body for body in bodies if body.lower() not in PARTS)
         if "" not in bodies or not others or self.chosen:
             return
         columns = {quantity: self.bodies_with(quantity)[others[0]] for quantity in "xy"}
@@ -260,16 +256,9 @@ class NamedColumns:
             length = meaning.quantity in ("x", "y", "z")
             if (length and stated) or self.lenient:
                 continue
-            same = [
-                other
-                for other, one in self.meanings.items()
-                if (one.quantity, one.body) == (meaning.quantity, meaning.body) and not one.unknown
-            ]
-            if (
-                same
-                or meaning.quantity == "z"
-                or (meaning.quantity == "t" and self.bodies_with("frame"))
-            ):
+            known = {(one.quantity, one.body) for one in self.meanings.values() if not one.unknown}
+            counted = meaning.quantity == "t" and self.bodies_with("frame")
+            if meaning.quantity == "z" or counted or (meaning.quantity, meaning.body) in known:
                 self.drop([at], f"'{meaning.unknown}' is not a known unit")
                 continue
             raise InputError(self.no_unit(at, meaning.unknown))
@@ -314,7 +303,7 @@ def _base(body: str) -> str:
 def may_be_unit(word: str) -> bool:
     """Whether a word next to a coordinate may be a unit rather than the name of a body."""
     lower = word.lower()
-    other = lower in VARIANTS or lower in SETPOINTS or lower in MIDDLE | FRONT | REAR
+    other = lower in VARIANTS | SETPOINTS | PARTS
     return lower.isalpha() and len(lower) > 1 and not other and ROOTS.get(lower) != "body"
 
 

@@ -14,10 +14,11 @@ from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import argument_text
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.cleaning.clean import LARGEST_SHARE, order_in_frame
-from driftwalk.record.column_names import column_meaning
-from driftwalk.record.raw import MISSING, Array, TableLayout
-from driftwalk.record.tables.in_memory import TableSource
+from driftwalk.record.column_names import quantity_of
+from driftwalk.record.raw import Array, TableLayout
+from driftwalk.record.tables.in_memory import TableSource, as_numbers, objects
 from driftwalk.record.tables.named_columns import LEFT_OUT, TableReading
+from driftwalk.record.tables.stamps import RowError
 from driftwalk.record.text import Table
 from driftwalk.record.vocabulary import ALLOWED, UNITS
 
@@ -71,20 +72,17 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
                 f"add {argument_text('columns', {'t': f'{names[at]}:{unit}'})}"
             )
     # The first rows are enough: what skips none in 4 MiB is no clock with missing rows.
-    numbers = tuple(sorted({x, y}))
-    table = source.read(TableLayout("", names, numbers=numbers, texts=tuple(texts)), head=True)
+    wanted = TableLayout("", names, numbers=tuple(sorted({x, y})), texts=tuple(texts))
+    table = source.read(wanted, head=True)
     counters = {at: values for at in free if (values := _numbers(table, at)) is not None}
-    if reading.body_column is None:
-        own = [at for at in free if len(table.labels[at]) >= _ORDER.own * table.rows]
-        for at in own:
-            if at in counters and _skips_rows(counters[at]):
-                frame, time = (
-                    argument_text("columns", {what: names[at]}) for what in ("frame", "t")
-                )
-                return (
-                    f"no column is known to hold times or frames, but '{names[at]}' counts up and "
-                    f"skips some: add {frame} if it counts frames, {time} if it holds times"
-                )
+    for at, values in counters.items() if reading.body_column is None else ():
+        own = len(table.labels[at]) >= _ORDER.own * table.rows
+        if own and _skips_rows(values):
+            frame, time = (argument_text("columns", {what: names[at]}) for what in ("frame", "t"))
+            return (
+                f"no column is known to hold times or frames, but '{names[at]}' counts up and "
+                f"skips some: add {frame} if it counts frames, {time} if it holds times"
+            )
     apart = _tracks(table, counters, free, reading.body_column, (x, y))
     if apart is not None:
         body, counter = apart
@@ -96,32 +94,29 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
             f"no column is known to hold times or frames, but it seems that {what}: add "
             f"{argument_text('columns', columns)}"
         )
-    if reading.body_column is None:
-        for at in free:
-            if _leaps(table.codes[at], table.numbers[x], table.numbers[y]):
-                add, skip = (argument_text("columns", {one: names[at]}) for one in ("body", "skip"))
-                return (
-                    f"rows seem to be of several bodies, or runs, which '{names[at]}' names: add "
-                    f"{add} if so, {skip} if it is one body, whose rows are its frames"
-                )
+    for at in free if reading.body_column is None else ():
+        if _leaps(table.codes[at], table.numbers[x], table.numbers[y]):
+            add, skip = (argument_text("columns", {one: names[at]}) for one in ("body", "skip"))
+            return (
+                f"rows seem to be of several bodies, or runs, which '{names[at]}' names: add "
+                f"{add} if so, {skip} if it is one body, whose rows are its frames"
+            )
     return None
 
 
 def _position(reading: TableReading) -> tuple[int, int]:
     """Return two columns that move with the body."""
     places = next(iter(reading.bodies.values()))
-    first, second = (
-        places.get(axis, places.get(f"{axis}1", min(places.values()))) for axis in "xy"
-    )
-    return first, second
+    x, y = (places.get(axis, places.get(f"{axis}1", min(places.values()))) for axis in "xy")
+    return x, y
 
 
 def _numbers(table: Table, column: int) -> Array | None:
     """Return the values of a column of texts in each row, None where one is no number."""
-    labels = [label.replace(",", ".") for label in table.labels[column]]
-    if not all(is_number(label) or label in MISSING for label in labels):
+    try:
+        values = as_numbers(objects(table.labels[column]), "")
+    except RowError:
         return None
-    values = np.array([float(one) if is_number(one) else np.nan for one in labels])
     numbers: Array = values[table.codes[column]]
     return numbers
 
@@ -167,24 +162,29 @@ def _tracks(
 
 def _counts_each(codes: Codes, values: Array, body: int | None) -> bool:
     """Whether values count up, mostly one by one, in the rows of each body."""
-    order = np.argsort(codes, kind="stable")
-    same = codes[order][1:] == codes[order][:-1]
-    steps = np.diff(values[order])[same]
+    (steps,) = _within(codes, values)
     if not steps.size or not (steps > 0).all() or np.median(steps) != 1.0:
         return False
-    firsts = values[order][np.append(True, ~same)]
+    firsts = values[np.unique(codes, return_index=True)[1]]
     # Of known bodies that all begin with the same number, counting the rows says the same.
     return body is None or not ((steps == 1.0).all() and np.unique(firsts).size == 1)
+
+
+def _within(codes: Codes, *columns: Array) -> list[Array]:
+    """Return the steps of columns from each row to the next of the same code."""
+    order = np.argsort(codes, kind="stable")
+    same = codes[order][1:] == codes[order][:-1]
+    return [np.diff(column[order])[same] for column in columns]
 
 
 def _starts_over(values: Array) -> bool:
     """Whether values count up one by one, and start over or stay the same for several bodies."""
     _, counts = np.unique(values, return_counts=True)
-    if (np.diff(values) >= 0).all():
-        return bool(counts[0] > 1 and (counts == counts[0]).all() and np.diff(values).max() == 1.0)
     steps = np.diff(values)
     back = steps < 0
-    return bool(back.any() and (steps[~back] == 1.0).mean() > _ORDER.own and back.mean() < 0.1)
+    if not back.any():
+        return bool(counts[0] > 1 and (counts == counts[0]).all() and steps.max() == 1.0)
+    return bool((steps[~back] == 1.0).mean() > _ORDER.own and back.mean() < 0.1)
 
 
 def _leaps(codes: Codes, x: Array, y: Array) -> bool:
@@ -197,9 +197,7 @@ def _leaps(codes: Codes, x: Array, y: Array) -> bool:
     turns = np.arange(codes.size) % labels
     if (counts == counts[0]).all() and (changes.sum() == labels - 1 or (codes == turns).all()):
         return True  # as many rows of each, one after the other or in turns
-    order = np.argsort(codes, kind="stable")
-    same = codes[order][1:] == codes[order][:-1]
-    within = np.hypot(*(np.diff(axis[order])[same] for axis in (x, y)))
+    within = np.hypot(*_within(codes, x, y))
     leaps = np.hypot(*(np.diff(axis)[changes] for axis in (x, y)))
     within = within[np.isfinite(within) & (within > 0)]
     leaps = leaps[np.isfinite(leaps)]
@@ -235,8 +233,8 @@ def body_columns(
     """
     if reading.clock is None:
         return []
-    x_column, y_column = _position(reading)
-    numbers = {x_column, y_column, *reading.numbers[:1]}
+    place = _position(reading)
+    numbers = {*place, *reading.numbers[:1]}
     taken = {*numbers, *reading.numbers, *reading.stamps, reading.body_column}
     # "min" next to "sec" names no body, and neither does a column of another known meaning.
     free = tuple(
@@ -244,7 +242,7 @@ def body_columns(
         for index, name in enumerate(names)
         if index not in taken
         and UNITS.get(name.strip().lower()) not in ALLOWED["t"]
-        and ((meaning := column_meaning(name)) is None or meaning.quantity == "body")
+        and quantity_of(name) in ("", "body")
     )
     # The first rows tell the columns of measurements, which have another value in every row.
     wanted = TableLayout(
@@ -253,7 +251,7 @@ def body_columns(
     head = source.read(wanted, head=True)
     free = tuple(index for index in free if 2 * len(head.labels[index]) <= max(head.rows, 2))
     table = source.read(replace(wanted, texts=free))
-    times, x, y = (table.numbers[index] for index in (reading.clock, x_column, y_column))
+    times, x, y = (table.numbers[index] for index in (reading.clock, *place))
     found = {
         index: len(table.labels[index])
         for index in free
@@ -272,13 +270,12 @@ def _are_names(labels: list[str], *, rows: int) -> bool:
 
 def _tells_apart(codes: Codes, clock: Array, x: Array, y: Array, *, in_order: bool) -> bool:
     """Whether hardly a body is in two places at one time, and none goes back in time if asked."""
-    present = np.flatnonzero(np.isfinite(clock) & np.isfinite(x) & np.isfinite(y))
-    if in_order:
-        rows = present[np.argsort(codes[present], kind="stable")]
-        same = codes[rows][1:] == codes[rows][:-1]
-        if (same & (np.diff(clock[rows]) < 0)).any():
-            return False
-    rows = present[np.lexsort((clock[present], codes[present]))]
-    again = (codes[rows][1:] == codes[rows][:-1]) & (np.diff(clock[rows]) == 0)
-    elsewhere = again & ((np.diff(x[rows]) != 0) | (np.diff(y[rows]) != 0))
+    present = np.isfinite(clock) & np.isfinite(x) & np.isfinite(y)
+    codes, clock, x, y = codes[present], clock[present], x[present], y[present]
+    if in_order and (_within(codes, clock)[0] < 0).any():
+        return False
+    rows = np.argsort(clock, kind="stable")
+    steps, along, across = _within(codes[rows], clock[rows], x[rows], y[rows])
+    again = steps == 0
+    elsewhere = again & ((along != 0) | (across != 0))
     return int(elsewhere.sum()) <= LARGEST_SHARE * (rows.size - int(again.sum()))

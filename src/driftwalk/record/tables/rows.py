@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
 import numpy as np
 
-from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError, InputError, argument_text, listed
 from driftwalk.record.cleaning.clean import order_in_body, split_bodies
 from driftwalk.record.convert_units import scale_wanted
@@ -108,7 +108,7 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
         body_columns=partial(body_columns, source, reading, labels),
         # Bare `x, y` next to a time in seconds is SI; next to frame numbers it may be pixels.
         bare_length_is_si=reading.bare and reading.clock_unit != "frame",
-        has_confidence=any("confidence" in places for places in reading.bodies.values()),
+        has_confidence=bool(reading.confidences),
         rows=table.rows,
         notes=[*notes, *against],
         columns=[column.described() for column in reading.columns],
@@ -172,32 +172,22 @@ def _detector_advice(source: TableSource) -> str:
 def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Table:
     used = {index for places in reading.bodies.values() for index in places.values()}
     used.update(reading.numbers)
-    flags = {
-        one["confidence"]
-        for one in reading.bodies.values()
-        if "confidence" in one and _holds_flags(source, one["confidence"])
-    }
-    body = () if reading.body_column is None else (reading.body_column,)
-    texts = (*body, *sorted(flags - set(body)))
-    wanted = TableLayout(
-        "",
-        labels,
-        numbers=tuple(sorted(used - set(texts))),
-        texts=texts,
-        stamps=reading.stamps,
-        clock=next(iter(reading.numbers), None),
-    )
+    flags = [at for at in reading.confidences if _holds_flags(source, at)]
+    body = [] if reading.body_column is None else [reading.body_column]
+    texts = tuple(dict.fromkeys([*body, *flags]))
+    wanted = TableLayout("", labels, 0, tuple(sorted(used - set(texts))), texts)
+    wanted = replace(wanted, clock=next(iter(reading.numbers), None), stamps=reading.stamps)
     table = source.read(wanted)
     for at, factor in reading.factors.items():
         table.numbers[at] *= factor
     for at in flags:
-        unknown = {label.lower() for label in table.labels[at]} - MISSING - set(_FLAGS)
+        said = [label.lower() for label in table.labels[at]]
+        unknown = set(said) - MISSING - set(_FLAGS)
         if unknown:
-            raise source.error(
-                f"'{min(unknown)}' in column '{labels[at]}' is neither a yes nor a no"
-            )
-        marks = [_FLAGS.get(label.lower(), np.nan) for label in table.labels[at]]
-        table.numbers[at] = np.array(marks)[table.codes[at]]
+            what = f"'{min(unknown)}' in column '{labels[at]}'"
+            raise source.error(f"{what} is neither a yes nor a no")
+        marks = np.array([_FLAGS.get(word, np.nan) for word in said])
+        table.numbers[at] = marks[table.codes[at]]
     return table
 
 
@@ -240,8 +230,7 @@ def _unread_angles(reading: TableReading) -> list[str]:
 def _doubted_confidences(table: Table, reading: TableReading, options: ReadOptions) -> list[str]:
     """Say so where `min_confidence` is a share of 1 and the confidences are not."""
     least = options.min_confidence
-    columns = sorted({one["confidence"] for one in reading.bodies.values() if "confidence" in one})
-    for at in columns:
+    for at in reading.confidences:
         known = table.numbers[at][np.isfinite(table.numbers[at])]
         if least is not None and least <= 1.0 and known.size and np.median(known) > 2.0:
             return [
@@ -276,10 +265,12 @@ def _bodies(
             "has several columns of x and also a column that names the body: choose one layout "
             "with `columns`",
         )
-    codes = None if column is None else table.codes[column]
     found, notes = {}, []
     for (name, places), plane in zip(reading.bodies.items(), planes, strict=True):
-        body, against = _body(table.numbers, places, clock, plane, reading, codes, options)
+        if plane is not None:
+            body, against = body_in_plane(table.numbers, places, clock, plane)
+        else:
+            body, against = _body(table, reading, places, clock, options)
         body.name = name or "0"
         if "confidence" in places and options.min_confidence is not None:
             body.blank(table.numbers[places["confidence"]] < options.min_confidence)
@@ -290,47 +281,29 @@ def _bodies(
         middle.name = "0"
         middle.theta = angle_between((start.x, start.y), (end.x, end.y))
         found = {"": middle}
-    if column is None or codes is None:
-        return list(found.values()), notes
-    return split_bodies(next(iter(found.values())), codes, table.labels[column]), notes
+    bodies = list(found.values())
+    if column is not None:
+        bodies = split_bodies(bodies[0], table.codes[column], table.labels[column])
+    return bodies, notes
 
 
 def _body(
-    values: dict[int, Array],
+    table: Table,
+    reading: TableReading,
     places: dict[str, int],
     clock: Array,
-    plane: Plane | None,
-    reading: TableReading,
-    codes: Codes | None,
     options: ReadOptions,
 ) -> tuple[RawBody, list[str]]:
-    """Return the body of some columns, and what speaks against its plane."""
-    if plane is not None:
-        return body_in_plane(values, places, clock, plane)
+    """Return the body of some columns that lie in one plane, and what is to be said of its box."""
+    values, box = table.numbers, reading.box
     theta = values[places["theta"]] if "theta" in places else None
-    if reading.box is None:
+    if box is None:
         x, y = (values[places[axis]] for axis in (("x", "y") if "x" in places else ("lon", "lat")))
         return RawBody("0", clock, x, y, theta), []
-    _require_units_of_box(reading, values, theta, options)
-    turn = 2.0 * np.pi / ANGLE_UNITS[reading.angle_unit or "rad"]
-    x, y = box_centre(reading.box, values)
-    followed = box_angle(reading.box, values, theta, codes, turn)
-    notes = []
-    if theta is not None and followed is not theta:
-        notes = ["the box looks the same after a half or quarter turn: its angle is unwrapped"]
-    return RawBody("0", clock, x, y, followed), notes
-
-
-def _require_units_of_box(
-    reading: TableReading, values: dict[int, Array], theta: Array | None, options: ReadOptions
-) -> None:
-    """Refuse sides that are shares of an image, and angles of an axis that cannot be radians."""
-    sides = [values[at] for at in (() if reading.box is None else reading.box.sides.values())]
-    known = [side[np.isfinite(side)] for side in sides]
-    image = None if reading.box is None else reading.box.image
-    if image is not None and any(one.max(initial=0.0) > max(image) for one in known):
+    sides = [values[at][np.isfinite(values[at])] for at in box.sides.values()]
+    if box.image is not None and any(one.max(initial=0.0) > max(box.image) for one in sides):
         raise FormatError("the sides of the boxes are no shares of an image: leave its size out")
-    shares = all(one.size and one.min() >= 0.0 and one.max() <= 1.0 for one in known)
+    shares = all(one.size and one.min() >= 0.0 and one.max() <= 1.0 for one in sides)
     if shares and options.metres_per_pixel is not None and not reading.length_unit:
         raise FormatError(
             "the sides of the boxes are between 0 and 1, shares of the image as YOLO writes them: "
@@ -341,6 +314,13 @@ def _require_units_of_box(
             "the angles of the boxes name no unit, and as radians they exceed a full turn: "
             'name it, as in `columns={"theta": "NAME:deg"}`'
         )
+    turn = 2.0 * np.pi / ANGLE_UNITS[reading.angle_unit or "rad"]
+    codes = None if reading.body_column is None else table.codes[reading.body_column]
+    followed = box_angle(box, values, theta, codes, turn)
+    notes = []
+    if theta is not None and followed is not theta:
+        notes = ["the box looks the same after a half or quarter turn: its angle is unwrapped"]
+    return RawBody("0", clock, *box_centre(box, values), followed), notes
 
 
 def the_one_that_fits(

@@ -26,11 +26,9 @@ UTC: Final = "UTC"
 LOCAL: Final = "local"
 DAY: Final = "day"
 
-_TIME: Final = r"(?P<hour>\d\d):(?P<minute>\d\d)(?::(?P<second>\d\d)(?:[.,](?P<fraction>\d+))?)?"
-_HALF: Final = (
-    r"(?P<hour>\d{1,2}):(?P<minute>\d\d)(?::(?P<second>\d\d)(?:[.,](?P<fraction>\d+))?)?"
-    r" ?(?P<half>[AaPp])\.?[Mm]\.?"
-)
+_REST: Final = r":(?P<minute>\d\d)(?::(?P<second>\d\d)(?:[.,](?P<fraction>\d+))?)?"
+_TIME: Final = rf"(?P<hour>\d\d){_REST}"
+_HALF: Final = rf"(?P<hour>\d{{1,2}}){_REST} ?(?P<half>[AaPp])\.?[Mm]\.?"
 """A time of day that counts twelve hours twice."""
 _DATES: Final = (
     r"(?P<year>\d{4})-(?P<month>\d\d)-(?P<day>\d\d)",

@@ -17,7 +17,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError, naming_its_file
 from driftwalk.record.bad_row import decoded_line, is_number, split_fields
-from driftwalk.record.column_names import column_meaning
+from driftwalk.record.column_names import quantity_of
 from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
 from driftwalk.record.tables.columns import read_columns
 from driftwalk.record.tables.in_memory import TABLE, MemorySource
@@ -106,15 +106,12 @@ def read_header(
     raw = head.split(b"\n")
     stated = _DELIMITER_LINE.fullmatch(raw[0].decode("utf-8", "replace"))
     begin = 1 if stated else 0
-    at = next(
-        (
-            number
-            for number, line in enumerate(raw)
-            if number >= begin and line.strip() and not line.startswith(b"#")
-        ),
-        None,
+    filled = (
+        number
+        for number, line in enumerate(raw)
+        if number >= begin and line.strip() and not line.startswith(b"#")
     )
-    if at is None:
+    if (at := next(filled, None)) is None:
         raise FormatError("the file is empty")
     lines = [decoded_line(line, number) for number, line in enumerate(raw[: at + 2], start=1)]
     separator = delimiter or (stated[1] if stated else detect_delimiter(lines[at : at + 2]))
@@ -205,17 +202,14 @@ def units_below(names: list[str], row: list[str], options: ReadOptions) -> list[
     """
     fields = [field.strip("[]() ") for field in row[: len(names)]]
     fields += [""] * (len(names) - len(fields))
-    chosen = set(options.columns.values())
     known = 0
     for name, field in zip(names, fields, strict=True):
-        if not field or field in MISSING:
-            continue
         if field.lower() in UNITS or field.lower() in NO_UNIT:
             known += 1
-        elif (
+        elif field not in MISSING and (
             is_number(field)
-            or name in chosen
-            or ((meaning := column_meaning(name)) is not None and meaning.quantity != "body")
+            or name in options.columns.values()
+            or quantity_of(name) not in ("", "body")
         ):
             return []
     return ["" if field in MISSING else field for field in fields] if known else []
@@ -233,18 +227,15 @@ def is_data(first: list[str], below: Sequence[list[str]], options: ReadOptions) 
     options : ReadOptions
         Columns that are named by their numbers are to hold numbers.
     """
-    second = below[0] if below else []
-    numeric = [
-        _is_numeric(field) and at < len(second) and _is_numeric(second[at])
-        for at, field in enumerate(first)
-    ]
-    if not any(numeric) or len(second) != len(first):
+    if not below or len(below[0]) != len(first):
+        return False
+    pairs = zip(first, below[0], strict=True)
+    if not any(_is_numeric(field) and _is_numeric(under) for field, under in pairs):
         return False
     references = [one.rpartition(":")[0] or one for one in options.columns.values()]
     if options.columns:
         return not any(one in first and not one.isdecimal() for one in references)
-    known = [meaning.quantity for name in first if (meaning := column_meaning(name)) is not None]
-    return not {"x", "y"} <= set(known)
+    return not {"x", "y"} <= set(map(quantity_of, first))
 
 
 def _is_numeric(field: str) -> bool:
