@@ -141,7 +141,8 @@ def _plain(cell: Any) -> float | str:
     """Return a value as a number or a text, NaN where it is missing."""
     if isinstance(cell, (bool, np.bool_)):
         return str(cell)
-    if isinstance(cell, numbers.Real) or hasattr(cell, "as_integer_ratio"):
+    duration = isinstance(cell, np.timedelta64)  # an integer to Python
+    if not duration and (isinstance(cell, numbers.Real) or hasattr(cell, "as_integer_ratio")):
         try:
             return float(cell)
         except OverflowError:  # infinite, as a text of it would be

@@ -252,6 +252,13 @@ def test_a_rotation_of_four_parts_is_an_orientation(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.unwrap(dataset.theta.values[:, 0]), ANGLE, atol=1e-12)
 
 
+def test_longitudes_with_a_height_lie_in_one_plane(tmp_path: Path) -> None:
+    path = columns(tmp_path, {"t": T, "lon": 7 + X / 1e5, "lat": 46 + Y / 1e5, "z": X})
+    assert load(path).sizes["body"] == 1
+    with pytest.raises(InputError, match="`up` is for positions with three axes"):
+        load(path, up="z")
+
+
 def test_longitudes_in_radians_are_refused(tmp_path: Path) -> None:
     path = columns(tmp_path, {"t": T, "lon_rad": 0.2 + 1e-8 * X, "lat_rad": 0.8 + 1e-8 * Y})
     with pytest.raises(InputError, match="'rad' in column 'lon_rad' is not a known unit"):

@@ -97,6 +97,7 @@ BAD: dict[str, tuple[Any, dict[str, Any], str]] = {
     "truth": (FRAME.assign(x_mm=True), {}, "'True' in column 'x_mm' is not a number"),
     "complex": ({"t": T, "x": X + 1j, "y": Y}, {}, "'1j' in column 'x' is not a number"),
     "dates": ({"t": T, "x": T.astype("M8[s]"), "y": Y}, {}, "in column 'x' is not a number"),
+    "durations": ({"t": T, "x": T.astype("m8[s]"), "y": Y}, {}, "in column 'x' is not a number"),
     "lengths": ({"t": T, "x": X[:2], "y": Y}, {}, "column 'x' has 2 rows, and 't' has 6"),
     "axes": ({"t": T, "x": MATRIX, "y": Y}, {}, "column 'x' has 2 axes"),
     "no rows": (FRAME.iloc[:0], {}, "the DataFrame: holds no rows of data"),
