@@ -163,8 +163,7 @@ def _stamp(tokens: list[str], unit: str) -> ColumnMeaning | None:
         return ColumnMeaning("t", unit, rank=0)
     if not parts or set(lower[:-1]) - {"field", "msg", "header", "stamp", "time", "t"}:
         return None
-    if len(lower) > 1 and not in_header and known == "s":
-        return None  # "time_sec" is a time with a unit
+    # "time_sec" is a time with a unit.
     if len(lower) > 1 and not in_header and lower[-1] not in ("nsec", "nsecs", "nanosec"):
         return None
     return ColumnMeaning("t" if known == "s" else "t+", known, rank=0 if in_header else 2)

@@ -150,13 +150,11 @@ def convert_units(
     turn = ANGLE_UNITS[raw.angle_unit] * (-1.0 if flip_theta else 1.0)
     bodies = []
     for body in raw.bodies:
-        x, y = _writable(body.x), _writable(body.y)
-        np.multiply(x, scale, out=x)
-        np.multiply(y, -scale if flip else scale, out=y)
+        x = np.multiply(body.x, scale, out=_writable(body.x))
+        y = np.multiply(body.y, -scale if flip else scale, out=_writable(body.y))
         theta = body.theta
         if theta is not None and turn != 1.0:
-            theta = _writable(theta)
-            np.multiply(theta, turn, out=theta)
+            theta = np.multiply(theta, turn, out=_writable(theta))
         bodies.append(RawBody(body.name, clocks[id(body.clock)], x, y, theta, extra=body.extra))
     return bodies, attrs
 

@@ -108,9 +108,7 @@ def recording_of_poses(
         if names[0] not in own:
             continue
         points = {}
-        for name in names:
-            if name not in own:
-                continue
+        for name in [name for name in names if name in own]:
             x, y = (values(own[name][axis]) for axis in "xy")
             confidence = values(own[name]["likelihood"]) if "likelihood" in own[name] else None
             seen = np.isfinite(x) & np.isfinite(y)

@@ -118,11 +118,6 @@ def as_numbers(values: Values, name: str) -> Array:
     if set(map(type, cells)) <= _PLAIN:
         with contextlib.suppress(OverflowError):
             return np.array(cells, dtype=np.float64)
-    return _of_cells(cells, name)
-
-
-def _of_cells(cells: list[Any], name: str) -> Array:
-    """Return the numbers of values that are not all numbers."""
     plain = [_plain(cell) for cell in cells]
     texts = [cell for cell in plain if isinstance(cell, str)]
     comma = any("," in text for text in texts) and not any("." in text for text in texts)
@@ -303,27 +298,23 @@ class MemorySource:
         taken = slice(TABLE.first_rows if head else None)
         used = {*wanted.numbers, *wanted.texts, *wanted.stamps}
         columns = {at: self.columns[at][taken] for at in used}
-        try:
-            return self._table(columns, wanted)
-        except RowError as error:
-            raise self.error_in_row(str(error), error.row) from error
-
-    def _table(self, columns: Mapping[int, Values], wanted: TableLayout) -> Table:
-        """Return the numbers, names and times of columns."""
         origin, calendar, numbers = 0, "", {}
         if wanted.clock is not None:
             origin = far_origin(np.asarray(columns[wanted.clock]))
-        for at in wanted.numbers:
-            values = columns[at] - origin if origin and at == wanted.clock else columns[at]
-            numbers[at] = as_numbers(values, wanted.names[at])
-        names = {at: as_names(columns[at]) for at in wanted.texts}
-        if wanted.stamps:
-            readers = {at: StampReader() for at in wanted.stamps}
-            ticks = [as_ticks(columns[at], reader) for at, reader in readers.items()]
-            for at, reader in readers.items():
+        try:
+            for at in wanted.numbers:
+                values = columns[at] - origin if origin and at == wanted.clock else columns[at]
+                numbers[at] = as_numbers(values, wanted.names[at])
+            readers = [StampReader() for _ in wanted.stamps]
+            ticks = list(map(as_ticks, (columns[at] for at in wanted.stamps), readers))
+            for at, reader in zip(wanted.stamps, readers, strict=True):
                 reader.zoned |= at in self.zoned
-            numbers[wanted.stamps[0]], first = clock_of_stamps(ticks, None)
-            origin, calendar = first or 0, calendar_of([*readers.values()])
+            if wanted.stamps:
+                numbers[wanted.stamps[0]], first = clock_of_stamps(ticks, None)
+                origin, calendar = first or 0, calendar_of(readers)
+        except RowError as error:
+            raise self.error_in_row(str(error), error.row) from error
+        names = {at: as_names(columns[at]) for at in wanted.texts}
         return Table(
             rows=next(iter(columns.values())).size,
             numbers=numbers,

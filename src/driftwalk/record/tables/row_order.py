@@ -58,10 +58,10 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
         Names of all columns.
     """
     used = {at for places in reading.bodies.values() for at in places.values()}
-    skipped = [at for at, column in enumerate(reading.columns) if column.why == LEFT_OUT]
-    free = [at for at in range(len(names)) if at not in (*used, *skipped, reading.body_column)]
+    used |= {at for at, column in enumerate(reading.columns) if column.why == LEFT_OUT}
+    stacked = [] if reading.body_column is None else [reading.body_column]
+    free = [at for at in range(len(names)) if at not in (*used, *stacked)]
     x, y = _position(reading)
-    texts = [*free, *([] if reading.body_column is None else [reading.body_column])]
     if not free:
         return None
     for at in free:
@@ -72,7 +72,7 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
                 f"add {argument_text('columns', {'t': f'{names[at]}:{unit}'})}"
             )
     # The first rows are enough: what skips none in 4 MiB is no clock with missing rows.
-    wanted = TableLayout("", names, numbers=tuple(sorted({x, y})), texts=tuple(texts))
+    wanted = TableLayout("", names, numbers=tuple(sorted({x, y})), texts=(*free, *stacked))
     table = source.read(wanted, head=True)
     counters = {at: values for at in free if (values := _numbers(table, at)) is not None}
     for at, values in counters.items() if reading.body_column is None else ():

@@ -139,8 +139,8 @@ def columns_of(
         )
     try:
         reading = read_columns(source, options)
-        bodies = reading.bodies.values()
-        return reading, [plane_of_columns(of, options.up) if "x" in of else None for of in bodies]
+        planes = [(of, plane_of_columns(of, options.up)) for of in reading.bodies.values()]
+        return reading, [plane if "x" in of else None for of, plane in planes]
     except FormatError:
         raise
     except InputError as error:

@@ -180,8 +180,6 @@ def _of_one_shape(texts: Texts) -> list[Integers]:
     """Return the rows of each class of texts that differ in their digits alone, as they come."""
     if not texts.size:
         return []
-    if not texts.dtype.itemsize:
-        return [np.arange(texts.size)]
     letters = texts.view(np.uint8).reshape(texts.size, -1)
     digits = (letters >= ord("0")) & (letters <= ord("9"))
     shapes = np.ascontiguousarray(np.where(digits, np.uint8(ord("0")), letters))
