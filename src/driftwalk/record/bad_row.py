@@ -27,16 +27,38 @@ def check_lines(block: bytes, layout: TableLayout, *, line: int, decimal: str = 
     decimal : {".", ","}
         Decimal sign of the numbers.
     """
-    widest = 0
+    widest, expected = 0, len(layout.names)
     for offset, raw in enumerate(block.split(b"\n")):
         number = line + offset
         text = decoded_line(raw, number)
         if "\0" in text:
             raise FormatError("has a zero byte: this is not a text file", line=number)
-        if text.strip():
-            fields = split_fields(text, layout.delimiter)
-            widest = max(widest, len(fields))
-            _check_row(fields, text, layout, line=number, decimal=decimal)
+        if not text.strip():
+            continue
+        fields = split_fields(text, layout.delimiter)
+        widest = max(widest, len(fields))
+        if len(fields) > expected and not any(fields[expected:]):
+            fields = fields[:expected]
+        if len(fields) != expected:
+            commas = layout.delimiter == "," and len(fields) > 1 and "." not in text
+            hint = (
+                " (if decimals are written with a comma, save them with a point)" if commas else ""
+            )
+            raise FormatError(
+                f"expected {expected} fields separated by "
+                f"{DELIMITER_NAMES.get(layout.delimiter, repr(layout.delimiter))}, "
+                f"got {len(fields)}{hint}",
+                line=number,
+            )
+        for column in layout.numbers:
+            value = fields[column]
+            if value not in MISSING and not is_number(value, decimal=decimal):
+                raise FormatError(
+                    f"'{value:.40}' in column '{layout.names[column]}' is not a number"
+                    f"{_other_sign(value, decimal)}",
+                    line=number,
+                    column=column + 1,
+                )
     return widest
 
 
@@ -56,32 +78,6 @@ def decoded_line(line: bytes, number: int) -> str:
             line=number,
             column=error.start + 1,
         ) from error
-
-
-def _check_row(
-    fields: list[str], text: str, layout: TableLayout, *, line: int, decimal: str
-) -> None:
-    expected = len(layout.names)
-    if len(fields) > expected and not any(fields[expected:]):
-        fields = fields[:expected]
-    if len(fields) != expected:
-        commas = layout.delimiter == "," and len(fields) > 1 and "." not in text
-        hint = " (if decimals are written with a comma, save them with a point)" if commas else ""
-        raise FormatError(
-            f"expected {expected} fields separated by "
-            f"{DELIMITER_NAMES.get(layout.delimiter, repr(layout.delimiter))}, "
-            f"got {len(fields)}{hint}",
-            line=line,
-        )
-    for column in layout.numbers:
-        value = fields[column]
-        if value not in MISSING and not is_number(value, decimal=decimal):
-            raise FormatError(
-                f"'{value:.40}' in column '{layout.names[column]}' is not a number"
-                f"{_other_sign(value, decimal)}",
-                line=line,
-                column=column + 1,
-            )
 
 
 def _other_sign(value: str, decimal: str) -> str:

@@ -111,6 +111,7 @@ class TextPolicy(NamedTuple):
 
 TEXT: Final = TextPolicy()
 
+_BUFFER: Final = 1 << 20
 GZIP_MAGIC = b"\x1f\x8b"
 BOM = b"\xef\xbb\xbf"
 
@@ -140,7 +141,7 @@ def open_binary(path: Path) -> IO[bytes]:
     """Open a file for reading, through gzip and as UTF-8 when its content says so."""
     file = _opened(path)
     encoding = _encoding(file)
-    return file if encoding is None else _buffered(TranscodedText(file, encoding))
+    return file if encoding is None else io.BufferedReader(TranscodedText(file, encoding), _BUFFER)
 
 
 def encoding_notes(path: Path) -> list[str]:
@@ -164,14 +165,11 @@ def _opened(path: Path) -> io.BufferedReader:
     try:
         with path.open("rb") as start:
             compressed = start.read(2) == GZIP_MAGIC
-        return _buffered(_BoundedGzip(path) if compressed else io.FileIO(path))
+        raw: Any = _BoundedGzip(path) if compressed else io.FileIO(path)
+        return io.BufferedReader(raw, _BUFFER)
     except (OSError, ValueError) as error:  # ValueError: a name that no file can have
         reason = getattr(error, "strerror", None) or error
         raise FormatError(f"cannot be opened: {reason}") from error
-
-
-def _buffered(raw: Any) -> io.BufferedReader:
-    return io.BufferedReader(raw, 1 << 20)
 
 
 def _encoding(file: io.BufferedReader) -> str | None:
@@ -295,7 +293,10 @@ class _Collected:
         for column in self._layout.numbers:
             values = frame[column].to_numpy()
             if column == clock:
-                values = self._from_origin(values)
+                # From its first value on, where float64 would round it.
+                first = self._origin = far_origin(values) if self._origin is None else self._origin
+                if first:
+                    values = values - (first if values.dtype.kind == "i" else float(first))
             self._parts[column].append(values.astype(np.float64))
         for column, seen in self._labels.items():
             local, texts = frame[column].fillna("").astype(str).factorize()
@@ -345,14 +346,6 @@ class _Collected:
         """Whether no number so far has decimals."""
         parts = [part for at in self._layout.numbers for part in self._parts[at]]
         return not any((part[np.isfinite(part)] % 1.0 != 0.0).any() for part in parts)
-
-    def _from_origin(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Return the clock from its first value on, where float64 would round it."""
-        if self._origin is None:
-            self._origin = far_origin(values)
-        if not self._origin:
-            return values
-        return values - (self._origin if values.dtype.kind == "i" else float(self._origin))
 
     def _clock(self, frame: Any, block: bytes, line: int) -> Array:
         """Return the time stamps of a block in nanoseconds from the first one on."""
@@ -424,7 +417,9 @@ def _parse(block: bytes, layout: TableLayout, *, line: int, decimal: str) -> Any
     used = sorted({*layout.numbers, *layout.texts, *layout.stamps})
     # The stubs of pandas cannot follow options in a dictionary.
     missing: Any = {at: list(NAMELESS if at in layout.texts else MISSING) for at in used}
-    exact: Any = {} if _pandas_is_exact(pd.__version__) else {"float_precision": "round_trip"}
+    # Before 3.1 the usual parsing of pandas is not correctly rounded.
+    old = tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1)
+    exact: Any = {"float_precision": "round_trip"} if old else {}
     try:
         frame = pd.read_csv(
             io.BytesIO(block),
@@ -448,12 +443,6 @@ def _parse(block: bytes, layout: TableLayout, *, line: int, decimal: str) -> Any
     if b'"' in block and len(frame) != whole.size:
         raise FormatError("has a quotation mark that is not closed", line=line)
     return frame
-
-
-def _pandas_is_exact(version: str) -> bool:
-    """Whether pandas' default parsing of floats is correctly rounded (from 3.1 on)."""
-    major, minor = (int(part) for part in version.split(".")[:2])
-    return (major, minor) >= (3, 1)
 
 
 def _field_counts(block: bytes, delimiter: str) -> Integers:

@@ -188,12 +188,11 @@ class _Reader(NamedColumns):
 
     def _find_confidences(self) -> None:
         """Give each body the column of its confidence."""
-        found: dict[str, list[int]] = {}
-        for at, one in self.meanings.items():
-            if one.quantity == "confidence":
-                found.setdefault(one.body, []).append(at)
+        found = [
+            (one.body, at) for at, one in self.meanings.items() if one.quantity == "confidence"
+        ]
         for body, places in self.result.bodies.items():
-            own = found.get(body) or found.get("", [])
+            own = [at for of, at in found if of == body] or [at for of, at in found if not of]
             if len(own) > 1:
                 raise InputError(self.both(own[0], own[1], "confidence"))
             if own:

@@ -77,10 +77,7 @@ def detect_delimiter(lines: list[str]) -> str:
 def is_numeric_row(fields: list[str]) -> bool:
     """Whether a row is data: each field is a number, a time or missing, and one at least is not."""
     known = [field for field in fields if field not in MISSING]
-    return bool(known) and all(
-        is_number(field) or is_number(field, decimal=",") or stamp_form(field) is not None
-        for field in known
-    )
+    return bool(known) and all(_is_numeric(field) or stamp_form(field) for field in known)
 
 
 @naming_its_file
