@@ -293,10 +293,11 @@ class _Collected:
         for column in self._layout.numbers:
             values = frame[column].to_numpy()
             if column == clock:
-                # From its first value on, where float64 would round it.
-                first = self._origin = far_origin(values) if self._origin is None else self._origin
-                if first:
-                    values = values - (first if values.dtype.kind == "i" else float(first))
+                if self._origin is None:
+                    self._origin = far_origin(values)
+                if self._origin:
+                    whole = values.dtype.kind == "i"
+                    values = values - (self._origin if whole else float(self._origin))
             self._parts[column].append(values.astype(np.float64))
         for column, seen in self._labels.items():
             local, texts = frame[column].fillna("").astype(str).factorize()

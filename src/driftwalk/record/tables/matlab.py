@@ -291,7 +291,8 @@ def _columns(value: Value, rows: int) -> list[Values]:
         return []
     if rows not in (value.shape if min(value.shape) > 1 else (value.size,)):
         return []
-    return [*(value.T if value.shape[0] == rows else value)]
+    columns = value.T if value.shape[0] == rows else value
+    return [*columns]
 
 
 def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
