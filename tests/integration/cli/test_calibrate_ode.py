@@ -144,13 +144,14 @@ def test_without_a_flow_it_says_so(tmp_path: Path) -> None:
     assert done.code == 2
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_both_engines_calibrate_a_recording_alike(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Four minutes of the bundled recording in its true flow: the same statistic, two engines.
 
-    Each estimate lies in the other's 90 % interval.
+    Each estimate lies in the other's 90 % interval. In every run:
+    `test_with_a_force_both_engines_take_the_same_steps`.
     """
     leave_out_figures(monkeypatch)
     study = written(tmp_path, step="4ms")
