@@ -62,23 +62,30 @@ def synthetic_recording(duration: float, seed: int = 5, flow=None):
 
 
 @pytest.fixture(scope="module")
-def early_and_found():
-    """Return what is given while the halves are computed, and the calibration."""
-    study, given = apply_overrides(dw.Study(), SMALL), []
+def found():
+    study = apply_overrides(dw.Study(), SMALL)
+    return dw.calibrate(synthetic_recording(400.0), study, flow=dw.tank30_flow(), threads=2)
+
+
+def calibrated_minute(threads):
+    """Return what is given while the halves of a minute are computed, and its calibration."""
+    study, given = apply_overrides(dw.Study(), {**SMALL, "calibration.bootstrap": 8}), []
+    recording, flow = synthetic_recording(60.0), dw.tank30_flow()
     whole = dw.calibration.calibrate(
-        synthetic_recording(400.0),
-        study,
-        flow=dw.tank30_flow(),
-        threads=2,
-        meanwhile=given.append,
+        recording, study, flow=flow, threads=threads, meanwhile=given.append
     )
     (early,) = given
     return early, whole
 
 
 @pytest.fixture(scope="module")
-def found(early_and_found):
-    return early_and_found[1]
+def on_two_threads():
+    return calibrated_minute(2)
+
+
+@pytest.fixture(scope="module")
+def on_one_thread():
+    return calibrated_minute(1)
 
 
 @pytest.mark.slow
@@ -181,22 +188,17 @@ def test_place_and_quadrant_are_where_the_world_and_the_recording_differ(found):
 
 
 @pytest.mark.slow
-def test_neither_threads_nor_what_is_given_meanwhile_change_a_bit(found):
-    study = apply_overrides(dw.Study(), SMALL)
-    again = dw.calibrate(synthetic_recording(400.0), study, flow=dw.tank30_flow(), threads=1)
-    assert_same_bits(again, found)
-    assert again.identical(found)
+def test_neither_threads_nor_what_is_given_meanwhile_change_a_bit(on_one_thread, on_two_threads):
+    alone, together = on_one_thread[1], on_two_threads[1]
+    assert_same_bits(alone, together)
+    assert alone.identical(together)
 
 
 @pytest.mark.slow
-def test_one_thread_gives_what_figures_show_at_the_end():
+def test_one_thread_gives_what_figures_show_at_the_end(on_one_thread):
     """It has no other thread, which would draw them meanwhile."""
-    few = {"calibration.replicates": 1, "calibration.bootstrap": 8}
-    study, given = apply_overrides(dw.Study(), {**SMALL, **few}), []
-    recording, flow = synthetic_recording(60.0), dw.tank30_flow()
-    whole = dw.calibration.calibrate(recording, study, flow=flow, threads=1, meanwhile=given.append)
-    assert len(given) == 1
-    assert given[0] is whole
+    given, whole = on_one_thread
+    assert given is whole
 
 
 @pytest.mark.study
@@ -220,9 +222,9 @@ def test_the_second_half_of_a_changing_flow_has_its_own_water():
 
 
 @pytest.mark.slow
-def test_meanwhile_gets_all_that_figures_show(early_and_found, tmp_path):
-    recording, flow = synthetic_recording(400.0), dw.tank30_flow()
-    early, whole = early_and_found
+def test_meanwhile_gets_all_that_figures_show(on_two_threads, tmp_path):
+    recording, flow = synthetic_recording(60.0), dw.tank30_flow()
+    early, whole = on_two_threads
     lacking = set(whole.variables) - set(early.variables)
     assert {"second_half_ks_distance", "second_half_noise_floor"} <= lacking
     assert all(name.startswith(("first_half_", "second_half_")) for name in lacking)

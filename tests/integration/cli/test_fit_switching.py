@@ -144,7 +144,7 @@ def test_named_flows_have_a_force_each(tmp_path: Path) -> None:
     assert done.code == 0, done.err
     assert "force in flow low σ_F" in done.out
     assert "force in flow high σ_F" in done.out
-    found = answer(here(*words, "--overwrite", "--json"))
+    found = answer(here("info", tmp_path / "run", "--json"))
     assert found["verdict"] == "explains", found["verdict_reasons"]
     sd = np.log(np.divide(found["flow_force_std_high_N"], found["flow_force_std_low_N"])) / 3.29
     assert (abs(np.log(np.divide(found["flow_force_std_N"], FORCES_N))) < 4.0 * sd).all()
