@@ -97,7 +97,8 @@ def test_fit_prints_its_answer_before_it_draws(
         return []
 
     monkeypatch.setattr(driftwalk.figures, "write_figures", draw)
-    words = ["fit", str(RECORDING), *TANK, "--to", "60s", "-o", str(tmp_path / "run")]
+    coarse = ("--to", "60s", "--spline-spacing", "3cm")
+    words = ["fit", str(RECORDING), *TANK, *coarse, "-o", str(tmp_path / "run")]
     assert main(words) == 0
     assert "drag coefficient" in drawn[0]
     assert "verdict" in drawn[0]

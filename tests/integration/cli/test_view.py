@@ -133,18 +133,21 @@ def test_nonsense_on_the_socket_is_survived(server: PageServer) -> None:
 
 @pytest.mark.slow
 def test_bad_utf_8_ends_only_its_sender_and_ctrl_c_ends_the_server(finished: Path) -> None:
-    with served("view", finished) as started:
-        with started.socket() as other, started.socket() as channel:
-            received(channel, "page")
-            # A text frame, masked with zeros, of two bytes that no UTF-8 has.
-            channel.socket.sendall(b"\x81\x82\x00\x00\x00\x00\xff\xfe")
-            with pytest.raises(ConnectionClosedError, match="1007"):
-                received(channel, "never")
-            received(other, "page")
-            say(other, type="cell", id="map", row=0, column=0)
-            received(other, "cell")
-            # Ctrl-C ends it while a browser is there.
-            code, words = started.stop()
+    with (
+        served("view", finished) as started,
+        started.socket() as other,
+        started.socket() as channel,
+    ):
+        received(channel, "page")
+        # A text frame, masked with zeros, of two bytes that no UTF-8 has.
+        channel.socket.sendall(b"\x81\x82\x00\x00\x00\x00\xff\xfe")
+        with pytest.raises(ConnectionClosedError, match="1007"):
+            received(channel, "never")
+        received(other, "page")
+        say(other, type="cell", id="map", row=0, column=0)
+        received(other, "cell")
+        # Ctrl-C ends it while a browser is there.
+        code, words = started.stop()
     assert code == 0
     assert words == "driftwalk: Ctrl-C ends it\n"
 
