@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import os
@@ -12,6 +13,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -376,17 +378,16 @@ def test_a_finished_run_that_lost_its_results(finished: Path, tmp_path: Path) ->
 @pytest.mark.slow
 def test_a_sweep_that_has_not_begun(tmp_path: Path) -> None:
     specification = {"study": dw.Study().to_dict(), "body": None, "kind": "calibration"}
-    with (
-        RunDirectory(tmp_path / "run", specification=specification),
-        served("view", tmp_path / "run") as started,
-        started.socket() as channel,
-    ):
-        page = received(channel, "page")["page"]
+    with RunDirectory(tmp_path / "run", specification=specification):
+        source = RunSource(tmp_path / "run")
+        page = source.greeting()[0]["page"]
         assert page["state"] == {"finished": False, "progress": 0.0, "words": "map: 0 %"}
         value = dw.page.decode_array(page["sections"][0]["value"])
         assert np.isnan(value).all()
-        say(channel, type="cell", id="map", row=0, column=0)
-        assert received(channel, "cell")["excerpt_x"] is None
+        told: list[Any] = []
+        asked = {"type": "cell", "id": "map", "row": 0, "column": 0}
+        asyncio.run(source.receive(asked, told.append))
+        assert [one["excerpt_x"] for one in told if one["type"] == "cell"] == [None]
 
 
 @pytest.mark.slow

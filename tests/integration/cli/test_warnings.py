@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from chain_runs import chain_runs
 from command_line import FLOW, GRID, RECORDING, Done, here, refusal
 from every_kind import every_kind
 from finished_run import write_finished_run
@@ -272,9 +273,9 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_finished_run(tmp_path_factory.mktemp("finished") / "run")
 
 
-def assembled(place: Path, out: Path) -> Path:
-    """Return a finished run of self-assembly."""
-    here("assemble", "--flow", FLOW, "--blocks", "3", "--runs", "100", "--film", "none", "-o", out)
+def assembled(out: Path) -> Path:
+    """Return runs of self-assembly."""
+    chain_runs(60, 1).to_netcdf(out)
     return out
 
 
@@ -360,7 +361,7 @@ LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
         *("control", "test", planned(out / "policy.nc"), "--worlds", "20", "-o", out / "run")
     ],
     "kinetics": lambda place, run, out: [
-        *("kinetics", assembled(place, out / "three"), "-o", out / "run")
+        *("kinetics", assembled(out / "runs.nc"), "-o", out / "run")
     ],
     "infer-outcomes": lambda place, run, out: [
         *("infer-outcomes", counted(out), "--flow", FLOW, "--blocks", "2", "--after", "4s"),
