@@ -684,7 +684,7 @@ PAGES: dict[str, Page] = {
         holds=("found.attrs['target'] == '2'",),
         makes=("yield/yields.nc", "listed/yields.nc", "tanks/yields.nc", "yield.html"),
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/simulate.md": Page(
         provide=_files(_flow("flow.nc"), _diffusing, _fitted),
