@@ -353,16 +353,16 @@ def on_the_ground(bodies: list[RawBody]) -> str:
     InputError
         When a latitude is none.
     """
-    known = [np.isfinite(body.x) & np.isfinite(body.y) for body in bodies]
-    first = next((body, at) for body, at in zip(bodies, known, strict=True) if at.any())
-    at = int(np.argmax(first[1]))
-    lon, lat = float(first[0].x[at]), float(first[0].y[at])
-    for body, there in zip(bodies, known, strict=True):
-        if (np.abs(body.y[there]) > 90.0).any() or (np.abs(body.x[there]) > 360.0).any():
-            raise InputError(
-                "a latitude is beyond 90, or a longitude beyond 360 degrees: are the columns "
-                "right, and are they in degrees?"
-            )
+    places = np.concatenate([[body.x, body.y] for body in bodies], axis=1)
+    places = places[:, np.isfinite(places).all(axis=0)]
+    if (np.abs(places) > [[360.0], [90.0]]).any():
+        raise InputError(
+            "a latitude is beyond 90, or a longitude beyond 360 degrees: are the columns right, "
+            "and are they in degrees?"
+        )
+    if not places.size:
+        return "longitude and latitude are missing in every row"
+    lon, lat = places[:, 0].tolist()
     bend = 1.0 - _ECCENTRICITY * np.sin(np.radians(lat)) ** 2
     east = _RADIUS_M / np.sqrt(bend) * np.cos(np.radians(lat))
     north = _RADIUS_M * (1.0 - _ECCENTRICITY) / bend**1.5

@@ -437,6 +437,14 @@ def test_longitude_and_latitude_are_projected(tmp_path: Path) -> None:
     assert "projected" in warnings_of(dataset)
 
 
+def test_longitudes_and_latitudes_that_are_all_missing(tmp_path: Path) -> None:
+    """As of other tables without a position: a warning, and not a `StopIteration`."""
+    dataset = load(table(tmp_path, "time_s,longitude,latitude", lambda k: f"{T[k]},,"))
+    assert np.isnan(dataset["x"]).all()
+    assert "longitude and latitude are missing in every row" in warnings_of(dataset)
+    assert "no row holds a position" in warnings_of(dataset)
+
+
 @pytest.mark.parametrize(
     "head",
     ["Time,Centre position X,Centre position Y,Head position X,Head position Y",
