@@ -15,6 +15,7 @@ from tracker_files import (
     FEATURES,
     NAMES,
     SESSION,
+    SPOTS,
     animalta,
     frame_table,
     session,
@@ -60,6 +61,16 @@ def test_trackpy_csv(tmp_path: Path, index: str) -> None:
         other = write(tmp_path / "o.csv", path.read_text().replace(name, "other"))
         with pytest.raises(FormatError, match=message):
             load(other, format="trackpy", **FRAMES)
+
+
+def test_spots_none_of_which_is_in_a_track_are_refused(tmp_path: Path) -> None:
+    """Found by reading: an error without the file's name came up instead."""
+    loose = write(tmp_path / "l.csv", ",".join(NAMES), "9,9,9,9,1,", "8,9,9,9,2,")
+    with pytest.raises(FormatError, match=r"l\.csv: no feature is linked to a particle"):
+        load(loose, **FRAMES)
+    spots = write(tmp_path / "s.csv", SPOTS, "ID1,1,,5,1.0,2.0,0.0,0.0,0")
+    with pytest.raises(FormatError, match=r"s\.csv: no spot belongs to a track"):
+        load(spots, **FRAMES)
 
 
 def test_trackpy_store_of_a_table_per_frame(tmp_path: Path) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.arrays import Codes, Integers
+from driftwalk.core.arrays import Codes, Indices, Integers
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.cleaning.clock import overlap, starts_over
 from driftwalk.record.cleaning.jumps import PART, find_jumps
@@ -42,17 +43,24 @@ def times_in_two_places(clock: Array, x: Array, y: Array, *, quantum: float = 0.
     """
     repeated = clock[1:] == clock[:-1]
     known = np.isfinite(x) & np.isfinite(y)
-    rows = np.flatnonzero((np.append(repeated, False) | np.append(False, repeated)) & known)
-    if not rows.size:
-        return clock[:0]
-    times = clock[rows]
-    starts = np.flatnonzero(np.append(True, times[1:] != times[:-1]))
-    apart = np.zeros(starts.size, dtype=bool)
-    for values in (x[rows], y[rows]):
-        spread = np.maximum.reduceat(values, starts) - np.minimum.reduceat(values, starts)
-        # The scale to metres leaves a resolution rounded.
-        apart |= spread > quantum * (1.0 + 1e-6)
-    return times[starts][apart]
+    rows = (np.append(repeated, False) | np.append(False, repeated)) & known
+    times, places = clock[rows], np.array([x[rows], y[rows]])
+    starts = starts_of_runs(times)
+    spread = np.maximum.reduceat(places, starts, 1) - np.minimum.reduceat(places, starts, 1)
+    # The scale to metres leaves a resolution rounded.
+    apart: Array = times[starts[(spread > quantum * (1.0 + 1e-6)).any(axis=0)]]
+    return apart
+
+
+def starts_of_runs(values: npt.NDArray[Any]) -> Indices:
+    """Return where runs of equal values begin.
+
+    Examples
+    --------
+    >>> starts_of_runs(np.array([5, 5, 7, 5])).tolist()
+    [0, 2, 3]
+    """
+    return np.flatnonzero(np.append(True, values[1:] != values[:-1])[: values.size])
 
 
 def refuse_several_bodies(body: RawBody, apart: Array, columns: BodyColumns | None) -> None:
@@ -87,8 +95,7 @@ def _advice(columns: BodyColumns | None) -> str:
             "the format has no column that distinguishes bodies: split the file, or "
             "correct these rows"
         )
-    found = columns(False)
-    if found:
+    if found := columns(False):
         return name_the_body(found)
     return (
         'if these are several bodies, add a column that names them (`columns={"body": "NAME"}`); '
@@ -166,13 +173,6 @@ def number_codes(values: Array) -> tuple[Codes, list[str]]:
     return codes.ravel().astype(np.int32), names
 
 
-def split_numbered(rows: RawBody, numbers: Array) -> tuple[list[RawBody], int]:
-    """Return one body per number that names it, and how many rows have none and are left out."""
-    named = np.isfinite(numbers)
-    codes, names = number_codes(numbers[named])
-    return split_bodies(rows.take(named), codes, names), int((~named).sum())
-
-
 def codes_in_arenas(
     arenas: tuple[Codes, list[str]], targets: tuple[Codes, list[str]]
 ) -> tuple[Codes, list[str]]:
@@ -193,10 +193,8 @@ def codes_in_arenas(
 def order_in_frame(frame: npt.ArrayLike) -> Codes:
     """Return, for rows in the order of their frames, the place of each row within its frame."""
     values = np.asarray(frame)
-    if not values.size:
-        return np.zeros(0, dtype=np.int32)
-    starts = np.flatnonzero(np.concatenate(([True], values[1:] != values[:-1])))
-    lengths = np.diff(np.append(starts, values.size))
+    starts = starts_of_runs(values)
+    lengths = np.diff(starts, append=values.size)
     return (np.arange(values.size) - np.repeat(starts, lengths)).astype(np.int32)
 
 
@@ -282,14 +280,13 @@ def clean_body(
         raise InputError(f"sort is 'error' or 'sort', got '{sort}'")
     counts = Counts(rows=body.clock.size)
     known = np.isfinite(body.clock)
-    if not known.all():
-        counts.without_time = int((~known).sum())
+    counts.without_time = int((~known).sum())
+    if counts.without_time:
         body = body.take(known)
     body = _in_order(body, counts, sort=sort, columns=columns)
     if start is not None or stop is not None:
-        inside = np.ones(body.clock.size, dtype=bool)
-        inside &= body.clock >= (-np.inf if start is None else start)
-        inside &= body.clock <= (np.inf if stop is None else stop)
+        first, last = (-np.inf if start is None else start), (np.inf if stop is None else stop)
+        inside = (body.clock >= first) & (body.clock <= last)
         counts.outside_window = int((~inside).sum())
         body = body.take(inside)
     repeated = body.clock[1:] == body.clock[:-1]

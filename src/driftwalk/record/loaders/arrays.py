@@ -200,8 +200,7 @@ class MatlabLoader:
             try:
                 return recording_of(the_one_that_fits(tables, options, "variable"), options)
             except FormatError as error:
-                also = f"; {unread}" if unread else ""
-                raise FormatError(f"{error.reason}{also}") from error
+                raise FormatError(f"{error.reason}{unread and f'; {unread}'}") from error
 
 
 ROBOT_ROWS: Final = 5
@@ -222,9 +221,8 @@ class MatlabTracksLoader:
         except FormatError:
             return 0.0
 
-    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+    def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every body."""
-        del options
         recording = _tracks(path)
         if recording is None or not recording.bodies:
             raise FormatError(
@@ -260,14 +258,10 @@ def _ctrax(value: Value) -> RawRecording | None:
         name = _one_number(one.get("id"), float(at))
         bodies.append(RawBody(f"{name:g}", clock, x, y, theta))
     rate = _one_number(elements[0].get("fps"), 0.0)
-    return RawRecording(
-        bodies,
-        clock_unit="s" if stamped else "frame",
-        length_unit="mm" if scaled else "px",
-        y_axis="down",
-        frame_rate_hz=rate if rate > 0.0 and not stamped else None,
-        separate=True,
-    )
+    raw = RawRecording(bodies, "s", "mm" if scaled else "px", y_axis="down", separate=True)
+    if not stamped:
+        raw.clock_unit, raw.frame_rate_hz = "frame", rate if rate > 0.0 else None
+    return raw
 
 
 def _flytracker(value: Value) -> RawRecording | None:
@@ -281,18 +275,8 @@ def _flytracker(value: Value) -> RawRecording | None:
     if stack.shape[2] != len(names) or not {"pos x", "pos y"} <= set(map(str, names)):
         return None
     at = {str(name): index for index, name in enumerate(names)}
-    clock = np.arange(stack.shape[1], dtype=np.float64)
-    of_x, of_y, of_angle = (at.get(name) for name in ("pos x", "pos y", "ori"))
-    bodies = [
-        RawBody(
-            str(number),
-            clock,
-            _values(track[:, of_x]),
-            _values(track[:, of_y]),
-            None if of_angle is None else _values(track[:, of_angle]),
-        )
-        for number, track in enumerate(stack, start=1)
-    ]
+    used = [at[name] for name in ("pos x", "pos y", "ori") if name in at]
+    bodies = _over_frames(stack[:, :, used].transpose(0, 2, 1))
     return RawRecording(bodies, length_unit="px", y_axis="down", theta_axis="up", separate=True)
 
 
@@ -304,18 +288,18 @@ def _robotarium(value: Value) -> RawRecording | None:
     count = value.shape[0] // ROBOT_ROWS
     if not count or value.shape[0] % ROBOT_ROWS > 1:
         return None
-    clock = np.arange(value.shape[1], dtype=np.float64)
-    robots = [[_values(value[ROBOT_ROWS * at + row]) for row in range(3)] for at in range(count)]
+    robots = value[: ROBOT_ROWS * count].reshape(count, ROBOT_ROWS, value.shape[1])
+    bodies = _over_frames(robots[:, :3])
     notes = ["every column counts as a frame; the Robotarium steps each 33 ms unless it is late"]
     if stamped:
         notes.append("the time stamps in the last row have no unit and are not read")
-    return RawRecording(
-        [RawBody(str(at), clock, *of) for at, of in enumerate(robots, start=1)],
-        length_unit="m",
-        y_axis="up",
-        notes=notes,
-        separate=True,
-    )
+    return RawRecording(bodies, "frame", "m", y_axis="up", notes=notes, separate=True)
+
+
+def _over_frames(values: np.ndarray[Any, Any]) -> list[RawBody]:
+    """Return the bodies of values over body, quantity (x, y and perhaps theta) and frame."""
+    clock = np.arange(values.shape[2], dtype=np.float64)
+    return [RawBody(str(at), clock, *map(_values, of)) for at, of in enumerate(values, start=1)]
 
 
 _READERS: Final[dict[str, Callable[[Value], RawRecording | None]]] = {
@@ -336,9 +320,4 @@ def _one_number(value: Any, otherwise: float) -> float:
     return float(value.ravel()[0]) if known else otherwise
 
 
-LOADERS = (
-    ArraysLoader(),
-    ArrowLoader(),
-    MatlabLoader(),
-    MatlabTracksLoader(),
-)
+LOADERS = (ArraysLoader(), ArrowLoader(), MatlabLoader(), MatlabTracksLoader())

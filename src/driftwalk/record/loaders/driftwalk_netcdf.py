@@ -46,25 +46,15 @@ class DriftwalkLoader:
         bodies = []
         for index, name in enumerate(body_names(dataset)):
             x, y, theta = (np.ascontiguousarray(field[:, index]) for field in fields)
-            own = {key: np.array(dataset[key].values[:, index], np.float64) for key in extra}
+            further = {key: np.array(dataset[key].values[:, index], np.float64) for key in extra}
             oriented = theta if np.isfinite(theta).any() else None
-            bodies.append(RawBody(name, time, x, y, oriented, extra=own))
-        kept = {
-            key: value
-            for key, value in dataset.attrs.items()
-            if key not in ("kind", "schema_version", "counts")
-        }
+            bodies.append(RawBody(name, time, x, y, oriented, extra=further))
+        own = {"kind", "schema_version", "counts"}
+        kept = {key: value for key, value in dataset.attrs.items() if key not in own}
         if dataset.attrs.get("format") == "driftwalk track":
             # `counts` is what reading found; the tracker's own counts are kept next to it.
             kept["tracking_counts"] = dataset.attrs["counts"]
-        return RawRecording(
-            bodies,
-            clock_unit="s",
-            length_unit="m",
-            y_axis="up",
-            attrs=kept,
-            extra=extra,
-        )
+        return RawRecording(bodies, "s", "m", y_axis="up", attrs=kept, extra=extra)
 
 
 def _replicate(simulation: xr.Dataset, replicate: int) -> xr.Dataset:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Sequence
+from contextlib import closing
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.record.raw import RawRecording, ReadOptions
@@ -21,9 +22,6 @@ from driftwalk.record.tables.text_source import (
     units_below,
 )
 from driftwalk.schema.stores.netcdf import file_start
-
-if TYPE_CHECKING:
-    from openpyxl import Workbook
 
 _OLD: Final = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 """Start of Excel's format before 2007, in which workbooks with a password are stored as well."""
@@ -63,53 +61,39 @@ class ExcelLoader:
         if _WORKBOOK not in members:
             advice = next((text for name, text in _OTHERS.items() if name in members), None)
             raise FormatError(advice or "is no Excel workbook, or a damaged one")
-        with _opened(path) as book:
-            sources = [SheetSource(sheet.title, _rows(sheet), options) for sheet in book.worksheets]
+        try:
+            from openpyxl import load_workbook
+        except ImportError as error:
+            raise InputError("a workbook needs openpyxl: pip install 'driftwalk[excel]'") from error
+        with damaged_as("as an Excel workbook", path), warnings.catch_warnings():
+            # What the library remarks on styles and rules has no part in the numbers.
+            warnings.simplefilter("ignore")
+            refuse_huge_zip(path)
+            book = load_workbook(path, read_only=True, data_only=True, keep_links=False)
+            with closing(book):
+                sources = [SheetSource(one.title, _rows(one), options) for one in book.worksheets]
         filled = {one.sheet: one for one in sources if one.names}
         return recording_of(the_one_that_fits(filled, options, "sheet"), options)
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Workbook]:
-    """Open a workbook; what goes wrong inside becomes a `FormatError`."""
-    try:
-        import openpyxl
-    except ImportError as error:
-        raise InputError("a workbook needs openpyxl: pip install 'driftwalk[excel]'") from error
-    with damaged_as("as an Excel workbook", path), warnings.catch_warnings():
-        # What the library remarks on styles and rules has no part in the numbers.
-        warnings.simplefilter("ignore")
-        refuse_huge_zip(path)
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
-        with closing(book):
-            yield book
 
 
 Row = Sequence[Any]
 
 
-def _rows(sheet: Any) -> Iterator[tuple[int, Row]]:
-    """Yield the rows of a sheet that are not blank with their numbers from 1.
+def _rows(sheet: Any) -> list[tuple[int, Row]]:
+    """Return the rows of a sheet that are not blank with their numbers from 1.
 
     The size that the sheet declares may be wrong.
     """
     sheet.reset_dimensions()
-    blank = 0
-    for line, row in enumerate(sheet.iter_rows(values_only=True), start=1):
-        if any(cell is not None and cell != "" for cell in row):
-            blank = 0
-            yield line, row
-            continue
-        blank += 1
-        # A sheet has no more rows, so a row of a higher number is damage.
-        if blank >= 1 << 20:
-            return
+    # A sheet has no more rows, so a row of a higher number is damage.
+    rows = enumerate(islice(sheet.iter_rows(values_only=True), 1 << 20), start=1)
+    return [one for one in rows if any(cell is not None and cell != "" for cell in one[1])]
 
 
 class SheetSource(MemorySource):
     """A table in a sheet; the first row that names positions is its header, if there is one."""
 
-    def __init__(self, sheet: str, rows: Iterator[tuple[int, Row]], options: ReadOptions) -> None:
+    def __init__(self, sheet: str, rows: list[tuple[int, Row]], options: ReadOptions) -> None:
         self.sheet, self._advice = sheet, ""
         begin = options.header_line or 1
         found = [entry for entry in rows if entry[0] >= begin]

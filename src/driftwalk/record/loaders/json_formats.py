@@ -43,10 +43,8 @@ class JsonPointsLoader:
         points = parse_json(bounded_text(path), path=path)
         if not isinstance(points, list) or not points:
             raise FormatError("expected a list with one point per frame")
-        rows = np.empty((len(points), len(KEYS)))
-        for index, point in enumerate(points):
-            rows[index] = _point(point, index)
-        x, y, theta, t = (np.ascontiguousarray(rows[:, column]) for column in range(4))
+        rows = np.array([_point(point, index) for index, point in enumerate(points)])
+        x, y, theta, t = np.ascontiguousarray(rows.T)
         undetected = (x == -1.0) & (y == -1.0)
         x[undetected] = y[undetected] = np.nan
         timed = bool(np.isfinite(t).any())
@@ -71,22 +69,16 @@ def _point(point: Any, index: int) -> list[float]:
     """Return (x, y, theta, t) of one entry, NaN for what it does not have."""
     if point is None:
         return [np.nan] * 4
-    if isinstance(point, dict):
+    values: list[Any] = []
+    if isinstance(point, dict) and {"x", "y"} <= set(point):
         values = [point.get(key) for key in KEYS]
-        complete = "x" in point and "y" in point
-    elif isinstance(point, list):
+    elif isinstance(point, list) and 2 <= len(point) <= 3:
         values = [*point, None, None][:4]
-        complete = 2 <= len(point) <= 3
-    else:
-        values, complete = [], False
-    if not complete or not _numbers(values) or any(isinstance(one, bool) for one in values):
+    if not values or not _numbers(values) or any(isinstance(one, bool) for one in values):
         raise FormatError(
             f'entry {index + 1} is {str(point)[:40]!r}, expected [x, y] or {{"x": .., "y": ..}}'
         )
-    try:
-        return [np.nan if value is None else float(value) for value in values]
-    except OverflowError as error:
-        raise FormatError(f"entry {index + 1} is too large for a number") from error
+    return [np.nan if value is None else float(value) for value in values]
 
 
 class JsonLinesLoader:
@@ -278,9 +270,4 @@ def _recording(rows: list[list[Any]], what: str, options: ReadOptions) -> RawRec
     return replace(raw, length_unit="px")
 
 
-LOADERS = (
-    JsonPointsLoader(),
-    JsonLinesLoader(),
-    CocoLoader(),
-    YoloFolderLoader(),
-)
+LOADERS = (JsonPointsLoader(), JsonLinesLoader(), CocoLoader(), YoloFolderLoader())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -69,11 +69,7 @@ class HeadedFormat:
         names = first_row(path)
         if tuple(names[: len(self.header)]) != self.header:
             raise FormatError(f"the first columns are not {', '.join(self.header)}", line=1)
-        own = {
-            quantity: column
-            for quantity, column in self.columns.items()
-            if column.partition(":")[0] in names
-        }
+        own = {key: one for key, one in self.columns.items() if one.partition(":")[0] in names}
         rate = None if "t" in own else options.frame_rate_hz
         stated = replace(options, delimiter=",", frame_rate_hz=rate)
         return described(path, stated, own, length_unit=self.length_unit)
@@ -110,9 +106,11 @@ def described(
 
 
 def side_by_side(
-    path: Path, pattern: re.Pattern[str], delimiter: str | None = None, clock: int | None = None
+    path: Path, pattern: re.Pattern[str], delimiter: str | None = None
 ) -> tuple[list[RawBody], dict[str, Array]]:
     """Return the bodies whose names stand in those of their columns, and all columns by name.
+
+    Each row counts as a frame.
 
     Parameters
     ----------
@@ -122,8 +120,6 @@ def side_by_side(
         Names of columns of positions, with the groups ``axis``, ``body`` and perhaps ``arena``.
     delimiter : str, optional
         None: recognised.
-    clock : int, optional
-        Column of the clock; None: each row counts as a frame.
 
     Raises
     ------
@@ -141,15 +137,35 @@ def side_by_side(
         what = f"'{lacking[0]}'" if lacking else "any body"
         raise FormatError(f"no column of x or of y for {what}", line=skip)
     table = read_table(path, TableLayout(delimiter, names, skip, tuple(range(len(names)))))
-    frame = np.arange(table.rows, dtype=np.float64) if clock is None else table.numbers[clock]
+    frame = np.arange(table.rows, dtype=np.float64)
     several = len({arena for arena, _ in found}) > 1
-    bodies = [
-        RawBody(
-            f"{arena}/{name}" if several else name, frame, *(table.numbers[place[a]] for a in "xy")
-        )
-        for (arena, name), place in found.items()
-    ]
+    bodies = []
+    for (arena, name), place in found.items():
+        x, y = (table.numbers[place[axis]] for axis in "xy")
+        bodies.append(RawBody(f"{arena}/{name}" if several else name, frame, x, y))
     return bodies, {name: table.numbers[at] for at, name in enumerate(names)}
+
+
+def numbers_by_name(
+    path: Path, names: list[str] | None = None, used: Iterable[str] = (), *, skip: int = 1
+) -> dict[str, Array]:
+    """Return columns of numbers of a table with commas, all of them or those that are used.
+
+    Parameters
+    ----------
+    path : Path
+        Text file.
+    names : list of str, optional
+        Names of all its columns; None: as its first line has them.
+    used : iterable of str
+        Some of the names; empty: all.
+    skip : int
+        Lines before the first row of data.
+    """
+    names = first_row(path) if names is None else names
+    places = {name: names.index(name) for name in used or names}
+    table = read_table(path, TableLayout(",", names, skip, tuple(sorted(places.values()))))
+    return {name: table.numbers[at] for name, at in places.items()}
 
 
 class MatricesLoader:
@@ -170,20 +186,18 @@ class MatricesLoader:
             raise InputError(
                 "one matrix per coordinate needs `x` and `y` (and `theta` if there is)"
             )
-        x, names = _matrix(_place(x_file, folder))
-        y, _ = _matrix(_place(options.y, folder))
-        theta = None if options.theta is None else _matrix(_place(options.theta, folder))[0]
-        for name, values in (("y", y), ("theta", theta)):
-            if values is not None and [v.size for v in values] != [v.size for v in x]:
+        given = {"x": x_file, "y": options.y, "theta": options.theta}
+        found = {at: _matrix(_place(one, folder)) for at, one in given.items() if one is not None}
+        x, names = found["x"]
+        for name, (values, _) in found.items():
+            if [v.size for v in values] != [v.size for v in x]:
                 raise InputError(
                     f"the matrices disagree: `x` has {x[0].size} rows and {len(x)} columns, "
                     f"`{name}` has {values[0].size} rows and {len(values)} columns"
                 )
         frame = np.arange(x[0].size, dtype=np.float64)
-        bodies = [
-            RawBody(name, frame, x[i], y[i], None if theta is None else theta[i])
-            for i, name in enumerate(names)
-        ]
+        columns = zip(*(values for values, _ in found.values()), strict=True)
+        bodies = [RawBody(name, frame, *of) for name, of in zip(names, columns, strict=True)]
         return RawRecording(bodies, bare_length_is_si=True)
 
 

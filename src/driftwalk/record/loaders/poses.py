@@ -13,7 +13,7 @@ bounding boxes have no keypoints. Where driftwalk wrote the file, positions stat
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -38,9 +38,7 @@ OF_SLEAP: Final = (0.2, "SLEAP's threshold of peaks")
 OF_MOVEMENT: Final = (0.6, "movement's threshold")
 
 
-def _places(
-    columns: Iterable[tuple[int, tuple[str, ...]]],
-) -> dict[str, dict[str, dict[str, int]]]:
+def _places(columns: Iterable[tuple[int, tuple[str, ...]]]) -> dict[str, dict[str, dict[str, int]]]:
     """Return the columns of coordinates of individuals' keypoints; other ones are left out."""
     found: dict[str, dict[str, dict[str, int]]] = {}
     for at, (individual, part, coordinate) in columns:
@@ -71,20 +69,17 @@ def _of_arrays(
     if confidence is not None and confidence.shape != (position.shape[0], *position.shape[2:]):
         raise FormatError(f"'{confidence.name}' has another shape than '{position.name}'")
 
-    arrays = {"x": position[:, 0], "y": position[:, 1]}
-    arrays |= {} if confidence is None else {"likelihood": confidence}
+    arrays = {"x": position.values[:, 0], "y": position.values[:, 1]}
+    arrays |= {} if confidence is None else {"likelihood": confidence.values}
     places = {
         individual: {
-            keypoint: {name: (name, at, of) for name in arrays}
+            keypoint: {name: array[:, at, of] for name, array in arrays.items()}
             for at, keypoint in enumerate(names[0])
         }
         for of, individual in enumerate(names[1])
     }
-
-    def values(place: tuple[str, int, int]) -> Array:
-        return np.array(arrays[place[0]].values[:, *place[1:]], dtype=np.float64)
-
-    return recording_of_poses(places, values, clock, options, usual)
+    copied = partial(np.array, dtype=np.float64)
+    return recording_of_poses(places, copied, clock, options, usual)
 
 
 def _in_order(values: xr.DataArray, *order: str) -> xr.DataArray:
@@ -95,6 +90,7 @@ def _in_order(values: xr.DataArray, *order: str) -> xr.DataArray:
     return values.transpose(*order)
 
 
+LEVELS: Final = ("individuals", "bodyparts", "coords")
 KEYS: Final = ("df_with_missing", "tracks")
 """Names under which DeepLabCut stores its table."""
 
@@ -139,10 +135,7 @@ def _header(path: Path) -> list[list[str]]:
     rows = [split_fields(line, ",") or [""] for line in header_rows(path, 5)]
     count = next((at for at, row in enumerate(rows[:4]) if row[0] == "coords"), -1) + 1
     first = [row[0] for row in rows[:count]]
-    if first not in (
-        ["scorer", "bodyparts", "coords"],
-        ["scorer", "individuals", "bodyparts", "coords"],
-    ):
+    if first not in (["scorer", *LEVELS[-2:]], ["scorer", *LEVELS]):
         raise FormatError(
             "the first column of the header is not scorer, (individuals,) bodyparts, coords: is it "
             "DeepLabCut's?",
@@ -243,13 +236,12 @@ class SleapCsvLoader:
             raise FormatError("no columns frame_idx, NODE.x and NODE.y", line=1)
         frame = names.index("frame_idx")
         track = names.index("track") if "track" in names else None
-        wanted = tuple(sorted({frame, *_used({"0": nodes}, options)}))
+        places = {"0": nodes}
+        wanted = tuple(sorted({frame, *_used(places, options)}))
         texts = () if track is None else (track,)
         table = read_table(path, TableLayout(",", names, 1, wanted, texts))
         numbers = table.numbers
-        raw = recording_of_poses(
-            {"0": nodes}, numbers.__getitem__, numbers[frame], options, OF_SLEAP
-        )
+        raw = recording_of_poses(places, numbers.__getitem__, numbers[frame], options, OF_SLEAP)
         if track is not None:
             (rows,) = raw.bodies
             raw.bodies = split_bodies(rows, table.codes[track], table.labels[track])
@@ -324,13 +316,10 @@ class MovementLoader:
         rate = dataset.attrs.get("fps")
         units = (*LENGTH_UNITS, "px")
         stated = next((one for one in units if one == position.attrs.get("units")), None)
-        return replace(
-            raw,
-            clock_unit=unit,
-            length_unit=stated or options.length_unit or "px",
-            frame_rate_hz=float(rate) if rate is not None and unit == "frame" else None,
-            attrs=_known(dataset, path) if own else {},
-        )
+        raw.clock_unit, raw.length_unit = unit, stated or options.length_unit or "px"
+        raw.frame_rate_hz = float(rate) if rate is not None and unit == "frame" else None
+        raw.attrs = _known(dataset, path) if own else {}
+        return raw
 
 
 def _orientation(dataset: xr.Dataset, individuals: list[str]) -> dict[str, Array]:
@@ -370,11 +359,8 @@ def _whole(values: xr.DataArray, *further: str) -> xr.DataArray:
     values = values.rename(
         {dim: str(dim)[:-1] for dim in values.dims if dim in ("keypoints", "individuals")}
     )
-    missing = {
-        name: [only]
-        for name, only in (("keypoint", SINGLE), ("individual", "0"))
-        if name not in values.dims
-    }
+    only = {"keypoint": SINGLE, "individual": "0"}
+    missing = {name: [one] for name, one in only.items() if name not in values.dims}
     return _in_order(values.expand_dims(missing), "time", *further, "keypoint", "individual")
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
@@ -84,15 +84,11 @@ class OptiTrackLoader:
                 line=1,
             )
         rate = settings.get("Export Frame Rate") or settings.get("Capture Frame Rate")
-        labels = [" ".join(filter(None, one)) for one in zip(names, quantities, axes, strict=True)]
+        titled = enumerate(zip(names, quantities, axes, strict=True), start=1)
+        labels = [" ".join(filter(None, one)) or str(number) for number, one in titled]
         recording = read_in_space(
             path,
-            TableLayout(
-                ",",
-                [label or str(number) for number, label in enumerate(labels, start=1)],
-                at + 1,
-                clock=axes.index(times[0] if times else "Frame"),
-            ),
+            TableLayout(",", labels, at + 1, clock=axes.index(times[0] if times else "Frame")),
             {name: _of_motive(titles, kind, name, settings) for name in found},
             options.up or "y",  # Motive's own axis; its CSV does not name another choice
             clock_unit="s" if times else "frame",
@@ -177,15 +173,10 @@ class ViconLoader:
                 line=_LINES,
             )
         labels = [f"{name} {axis}".strip() for name, axis in zip(names, axes, strict=True)]
+        layout, unit = TableLayout(",", labels, _LINES, clock=0), lengths.pop()
+        facts: dict[str, Any] = {"length_unit": unit, "frame_rate_hz": rate}
         try:
-            return read_in_space(
-                path,
-                TableLayout(",", labels, _LINES, clock=0),
-                bodies,
-                options.up or "z",
-                length_unit=lengths.pop(),
-                frame_rate_hz=rate,
-            )
+            return read_in_space(path, layout, bodies, options.up or "z", **facts)
         except FormatError as error:
             wrong = header_rows(path, error.line)[-1:] if error.line else []
             if not any(line.strip(", \r") in (*_READ, *_OTHERS) for line in wrong):
@@ -253,15 +244,10 @@ class QualisysLoader:
         for at, name in zip(range(first, len(fields), _WIDTH[kind]), names, strict=False):
             turns = range(at + 7, at + 16) if kind == "6D" else ()
             bodies[name] = SpaceColumns(range(at, at + 3), turns, MATRIX)
-        return read_in_space(
-            path,
-            TableLayout("\t", [""] * len(fields), skip),
-            bodies,
-            options.up or "z",
-            zero_is_missing=True,
-            length_unit="mm",
-            frame_rate_hz=_rate((facts.get("FREQUENCY") or [""])[0], "FREQUENCY", None),
-        )
+        layout = TableLayout("\t", [""] * len(fields), skip)
+        rate = _rate((facts.get("FREQUENCY") or [""])[0], "FREQUENCY", None)
+        known: dict[str, Any] = {"length_unit": "mm", "frame_rate_hz": rate}
+        return read_in_space(path, layout, bodies, options.up or "z", zero_is_missing=True, **known)
 
 
 LOADERS = (OptiTrackLoader(), ViconLoader(), QualisysLoader())

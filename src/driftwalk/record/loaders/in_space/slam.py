@@ -47,14 +47,10 @@ class EurocLoader:
         if lacking:
             raise FormatError(f"the header names no column of p_…_{lacking[0]}", line=1)
         wanted = ("x", "y", "z", *(PARTS if set(PARTS) <= set(columns) else ()))
-        unit = unit_of_name(names[0])
-        return _in_space(
-            path,
-            options,
-            {part: columns[part] for part in wanted},
-            TableLayout(",", names, 1),
-            unit if unit in CLOCK_UNITS else "ns",
-        )
+        used = {part: columns[part] for part in wanted}
+        stated = unit_of_name(names[0])
+        unit = stated if stated in CLOCK_UNITS else "ns"
+        return _in_space(path, options, used, TableLayout(",", names, 1), unit)
 
 
 def _in_space(

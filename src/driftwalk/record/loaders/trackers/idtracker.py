@@ -20,13 +20,12 @@ from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.core.files.bounded import MIB, read_bounded
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.cleaning.clean import number_codes, split_bodies
-from driftwalk.record.loaders.plain import side_by_side
-from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.loaders.plain import numbers_by_name, side_by_side
+from driftwalk.record.raw import Marks, RawBody, RawRecording, ReadOptions
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.npz import NPY
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
 from driftwalk.record.tables.text_source import first_line, first_row
-from driftwalk.record.text import read_table
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 _POSITION = re.compile(r"(?P<axis>[XY])(?P<body>\d+)")
@@ -46,15 +45,10 @@ class IdTrackerLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every individual; ``ProbId`` -1 and -2 mark positions that idTracker estimated."""
         bodies, columns = side_by_side(path, _POSITION, options.delimiter)
-        estimated = sum(
-            int((columns[f"ProbId{body.name}"] < 0).sum())
-            for body in bodies
-            if f"ProbId{body.name}" in columns
-        )
-        notes = (
-            [f"{estimated} positions were estimated by idTracker, not seen"] if estimated else []
-        )
-        return RawRecording(bodies, length_unit="px", notes=notes)
+        chances = [columns.get(f"ProbId{body.name}", np.zeros(0)) for body in bodies]
+        estimated = sum(int((one < 0).sum()) for one in chances)
+        note = f"{estimated} positions were estimated by idTracker, not seen"
+        return RawRecording(bodies, length_unit="px", notes=[note] if estimated else [])
 
 
 TABLE: Final = "trajectories.csv"
@@ -76,7 +70,6 @@ class IdTrackerAiLoader:
     name = "idtrackerai"
     description = "idtracker.ai 4 to 6 (.npy, .pickle, .h5, folder of CSV, tidy CSV; pixels)"
     marks = (
-        Marks("npy", ("trajectories", "frames_per_second", PROBABILITIES)),
         Marks("HDF5", ("trajectories", "frames_per_second", PROBABILITIES)),
         Marks("table", tuple(TIDY)),
         Marks("folder", (TABLE, ATTRIBUTES)),
@@ -216,11 +209,8 @@ def _of_pickle(path: Path, options: ReadOptions) -> RawRecording:
 def _of_hdf5(path: Path, options: ReadOptions) -> RawRecording:
     with opened_hdf5(path) as contents:
         trajectories = contents.array("trajectories")
-        attributes = {
-            name: value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-            for name in KNOWN
-            if (value := contents.file.attrs.get(name)) is not None
-        }
+        stored = contents.file.attrs
+        attributes = {name: np.asarray(stored[name]).tolist() for name in KNOWN if name in stored}
         known = contents.array(PROBABILITIES) if PROBABILITIES in contents.file else None
     return _of_arrays(trajectories, lambda: known, attributes, options)
 
@@ -228,7 +218,7 @@ def _of_hdf5(path: Path, options: ReadOptions) -> RawRecording:
 def _of_folder(folder: Path, options: ReadOptions) -> RawRecording:
     attributes = _attributes(folder / ATTRIBUTES)
     path = folder / TABLE
-    columns = _columns(path)
+    columns = numbers_by_name(path)
     places = [name for name in columns if name[:1] in "xy" and name[1:].isdecimal()]
     count = len(places) // 2
     expected = [f"{axis}{at}" for at in range(1, count + 1) for axis in "xy"]
@@ -240,15 +230,11 @@ def _of_folder(folder: Path, options: ReadOptions) -> RawRecording:
         file = folder / f"{PROBABILITIES}.csv"
         if not file.is_file():
             return None
-        return np.stack([one for name, one in _columns(file).items() if name != "time"], axis=1)
+        return np.stack(
+            [one for name, one in numbers_by_name(file).items() if name != "time"], axis=1
+        )
 
     return _of_arrays(trajectories, probabilities, attributes, options)
-
-
-def _columns(path: Path) -> dict[str, Array]:
-    names = first_row(path)
-    table = read_table(path, TableLayout(",", names, 1, tuple(range(len(names)))))
-    return {name: table.numbers[at] for at, name in enumerate(names)}
 
 
 def _attributes(path: Path) -> dict[str, Any]:
@@ -262,14 +248,13 @@ def _attributes(path: Path) -> dict[str, Any]:
 def _of_tidy(path: Path, options: ReadOptions) -> RawRecording:
     if first_row(path) != TIDY:
         raise FormatError(f"the columns are not {','.join(TIDY)}", line=1)
-    frame, time, individual, x, y, known = _columns(path).values()
+    frame, time, individual, x, y, known = numbers_by_name(path).values()
     if not np.isfinite(individual).all():
         raise FormatError("a row names no individual")
     attributes = _attributes(path.with_name(TIDY_ATTRIBUTES))
     by_frames = _rate(attributes) is not None or options.frame_rate_hz is not None
-    rows, clock_unit = RawBody("", frame, x, y), "frame"
-    if not by_frames:
-        rows.clock, clock_unit = time, "s"
+    clock, clock_unit = (frame, "frame") if by_frames else (time, "s")
+    rows = RawBody("", clock, x, y)
     raw = _recording([rows], clock_unit, lambda: known[:, None], attributes, options)
     codes, _ = number_codes(individual)
     labels = _labels(attributes.get("identities_labels"), int(codes.max()) + 1)

@@ -11,27 +11,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 from xml.parsers import expat
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.cleaning.clean import split_numbered
+from driftwalk.record.cleaning.clean import number_codes, split_bodies
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.raw import (
-    LENGTH_UNITS,
-    Array,
-    Marks,
-    RawBody,
-    RawRecording,
-    ReadOptions,
-    TableLayout,
-)
+from driftwalk.record.loaders.plain import numbers_by_name
+from driftwalk.record.raw import LENGTH_UNITS, Array, Marks, RawBody, RawRecording, ReadOptions
 from driftwalk.record.stores.hdf5 import Frame, Hdf5Contents, frame_in, names_in, opened_hdf5
 from driftwalk.record.tables.text_source import first_names, first_row
-from driftwalk.record.text import header_rows, open_binary, read_table
+from driftwalk.record.text import header_rows, open_binary
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 NEEDED: Final = ("TRACK_ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
@@ -65,21 +58,24 @@ class TrackMateLoader:
         length = stated_unit(units[places["POSITION_X"]])
         clock_unit = _clock_unit(units[places["POSITION_T"]], options)
         clock = "FRAME" if clock_unit == "frame" else "POSITION_T"
-        wanted = {name: places[name] for name in ("TRACK_ID", "POSITION_X", "POSITION_Y", clock)}
-        layout = TableLayout(",", names, header, tuple(sorted(wanted.values())))
-        table = read_table(path, layout)
-        track, x, y, time = (table.numbers[place] for place in wanted.values())
-        bodies, outside = split_numbered(RawBody("", time, x, y), track)
-        if not bodies:
-            raise FormatError("no spot belongs to a track")
-        return RawRecording(
-            bodies,
-            clock_unit=clock_unit,
-            length_unit=length,
-            y_axis="down",
-            rows=table.rows,
-            notes=[OUTSIDE.format(outside)] if outside else [],
-        )
+        used = ("TRACK_ID", "POSITION_X", "POSITION_Y", clock)
+        track, x, y, time = numbers_by_name(path, names, used, skip=header).values()
+        what = "no spot belongs to a track", OUTSIDE
+        facts = {"clock_unit": clock_unit, "length_unit": length, "y_axis": "down"}
+        return _of_numbered(RawBody("", time, x, y), track, what, **facts)
+
+
+def _of_numbered(
+    rows: RawBody, numbers: Array, what: tuple[str, str], **facts: Any
+) -> RawRecording:
+    """Return a body for each number; `what` says that no row has one, or how many have none."""
+    named = np.isfinite(numbers)
+    if not named.any():
+        raise FormatError(what[0])
+    bodies = split_bodies(rows.take(named), *number_codes(numbers[named]))
+    left_out = int((~named).sum())
+    notes = [what[1].format(left_out)] if left_out else []
+    return RawRecording(bodies, rows=named.size, notes=notes, **facts)
 
 
 def _clock_unit(stated: str, options: ReadOptions) -> str:
@@ -117,16 +113,15 @@ _SPOT: Final = ("ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
 class _Contents:
     """Attributes of the elements of a file."""
 
-    units: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] | None = None
+    """The attributes of the model, which names its units."""
     spots: list[float] = field(default_factory=list)
     """The attributes of `_SPOT`, one spot after the other."""
     edges: dict[str, list[float]] = field(default_factory=dict)
     """Track to the spots at the ends of its edges."""
-    kept: set[str] = field(default_factory=set)
-    """Tracks that the filters of the session keep."""
-    filtered: bool = False
+    kept: set[str] | None = None
+    """Tracks that the filters of the session keep; None: it has no filters."""
     track: str = ""
-    has_model: bool = False
 
     def start(self, element: str, attributes: dict[str, str]) -> None:
         """Take the start of an element."""
@@ -138,12 +133,11 @@ class _Contents:
         elif element == "Track":
             self.track = attributes["TRACK_ID"]
             self.edges.setdefault(self.track, [])
-        elif element == "TrackID":
-            self.kept.add(attributes["TRACK_ID"])
         elif element == "FilteredTracks":
-            self.filtered = True
+            self.kept = self.kept or set()
+        elif element == "TrackID" and self.kept is not None:
+            self.kept.add(attributes["TRACK_ID"])
         elif element == "Model":
-            self.has_model = True
             self.units = attributes
 
 
@@ -161,16 +155,13 @@ class TrackMateXmlLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every track; `frame_rate` counts frames in place of the file's times."""
         contents = _parsed(path)
-        if not contents.has_model or not contents.spots:
+        if contents.units is None or not contents.spots:
             raise FormatError("holds no spots: is it a TrackMate session?")
         spots = np.array(contents.spots).reshape(-1, len(_SPOT))
         spots = spots[np.argsort(spots[:, 0], kind="stable")]
         clock_unit = _clock_unit(f"({contents.units.get('timeunits', '')})", options)
-        tracks = {
-            name: ends
-            for name, ends in contents.edges.items()
-            if ends and (name in contents.kept or not contents.filtered)
-        }
+        kept = contents.edges if contents.kept is None else contents.kept
+        tracks = {name: ends for name, ends in contents.edges.items() if ends and name in kept}
         if not tracks:
             raise FormatError("no track is kept: track the spots in TrackMate, and save")
         bodies = [
@@ -178,14 +169,9 @@ class TrackMateXmlLoader:
             for name, ends in sorted(tracks.items(), key=lambda entry: (len(entry[0]), entry[0]))
         ]
         outside = len(spots) - len(np.unique(np.concatenate([*map(np.array, tracks.values())])))
-        return RawRecording(
-            bodies,
-            clock_unit=clock_unit,
-            length_unit=stated_unit(contents.units.get("spatialunits", "")),
-            y_axis="down",
-            rows=len(spots),
-            notes=[OUTSIDE.format(outside)] if outside else [],
-        )
+        length = stated_unit(contents.units.get("spatialunits", ""))
+        notes = [OUTSIDE.format(outside)] if outside else []
+        return RawRecording(bodies, clock_unit, length, y_axis="down", rows=len(spots), notes=notes)
 
 
 def _body(name: str, spots: Array, ends: list[float], *, clock: int) -> RawBody:
@@ -248,21 +234,15 @@ class TrackpyLoader:
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every particle; rows that are linked to none are left out."""
         is_hdf5 = file_start(path) == HDF5
-        columns = _of_store(path) if is_hdf5 else _of_csv(path)
-        features = RawBody("", columns["frame"], columns["x"], columns["y"])
-        bodies, loose = split_numbered(features, columns["particle"])
-        if not bodies:
-            raise FormatError("no feature is linked to a particle")
-        note = f"features that are linked to no particle, and left out: {loose}"
-        rows, notes = features.clock.size, [note] if loose else []
-        return RawRecording(bodies, length_unit="px", rows=rows, notes=notes)
+        x, y, frame, particle = (_of_store(path) if is_hdf5 else _of_csv(path)).values()
+        loose = "features that are linked to no particle, and left out: {}"
+        what = "no feature is linked to a particle", loose
+        return _of_numbered(RawBody("", frame, x, y), particle, what, length_unit="px")
 
 
 def _of_csv(path: Path) -> dict[str, Array]:
     names = first_row(path)
-    places = _places(names)
-    table = read_table(path, TableLayout(",", names, 1, tuple(sorted(places.values()))))
-    return {name: table.numbers[place] for name, place in places.items()}
+    return numbers_by_name(path, names, _places(names))
 
 
 def _of_store(path: Path) -> dict[str, Array]:
@@ -280,14 +260,13 @@ def _only_table(contents: Hdf5Contents, groups: list[str]) -> Frame:
     """Return the table of features; of several, the one of linked ones."""
     tables = {name: frame_in(contents, name) for name in groups}
     linked = [name for name, table in tables.items() if ("particle",) in table.columns]
-    if len(tables) == 1:
-        return next(iter(tables.values()))
-    if len(linked) != 1:
+    chosen = [*tables] if len(tables) == 1 else linked
+    if len(chosen) != 1:
         raise FormatError(
             f"holds the tables {', '.join(groups) or 'none'}, of which {len(linked)} have a column "
             "'particle': store the one of the recording alone"
         )
-    return tables[linked[0]]
+    return tables[chosen[0]]
 
 
 def _columns(frame: Frame) -> dict[str, Array]:
@@ -308,8 +287,4 @@ def _places(names: list[str]) -> dict[str, int]:
     return {name: names.index(name) for name in OF_TRACKPY}
 
 
-LOADERS = (
-    TrackMateLoader(),
-    TrackMateXmlLoader(),
-    TrackpyLoader(),
-)
+LOADERS = (TrackMateLoader(), TrackMateXmlLoader(), TrackpyLoader())

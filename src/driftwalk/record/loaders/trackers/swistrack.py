@@ -60,53 +60,40 @@ class SwisTrackTracksLoader:
         matches = [_FILE_NAME.fullmatch(file.name) for file in files]
         names = [str(int(match[1])) if match else "0" for match in matches]
         tables = dict(zip(names, map(_read_one, files), strict=True))
-        first = next(iter(tables.values()))
-        if any(set(table.numbers) != set(first.numbers) for table in tables.values()):
+        tracks = [*tables.values()]
+        if len({len(one) for one in tracks}) > 1:
             raise FormatError("the folder mixes track files of two SwisTrack versions")
-        old, all_numbers = len(first.numbers) > len(NEW), [one.numbers for one in tables.values()]
-        calibrated = old and any(one[at].any() for one in all_numbers for at in (3, 4))
-        world = calibrated and options.metres_per_pixel is None
-        timed = (
-            old and options.frame_rate_hz is None and all((n[8] >= 0).all() for n in all_numbers)
-        )
-        used = (8 if timed else 0, *((3, 4) if world else (1, 2)), *((6,) if old else ()))
-        bodies = [
-            RawBody(name, *(numbers[at] for at in used))
-            for name, numbers in zip(tables, all_numbers, strict=True)
-        ]
-        if not old:
-            return RawRecording(bodies, length_unit="px")
+        if len(tracks[0]) == len(NEW):
+            bodies = [RawBody(name, *one) for name, one in tables.items()]
+            return RawRecording(bodies, "frame", "px")
+        timed = options.frame_rate_hz is None and all((one[8] >= 0).all() for one in tracks)
+        world = _in_world([one[at] for one in tracks for at in (3, 4)], options)
+        used = (8 if timed else 0, *((3, 4) if world else (1, 2)), 6)
+        bodies = [RawBody(name, *(one[at] for at in used)) for name, one in tables.items()]
         return _recording(bodies, "ms" if timed else "frame", world=world)
 
 
-def _recording(
-    bodies: list[RawBody], clock_unit: str, *, world: bool, note: str = ""
-) -> RawRecording:
+def _in_world(places: Sequence[Array], options: ReadOptions) -> bool:
+    """Whether the run was calibrated, and nobody asks for the image."""
+    return options.metres_per_pixel is None and any(one.any() for one in places)
+
+
+def _recording(bodies: list[RawBody], clock_unit: str, *, world: bool) -> RawRecording:
     """Return bodies in the world or the image; angles are measured in the image in either case."""
-    return RawRecording(
-        bodies,
-        clock_unit=clock_unit,
-        length_unit="m" if world else "px",
-        y_axis="up" if world else "down",
-        theta_axis="down",
-        notes=[note] if note else [],
-    )
+    raw = RawRecording(bodies, clock_unit, "m" if world else "px", theta_axis="down")
+    raw.y_axis = "up" if world else "down"
+    return raw
 
 
 def _of_particles(
-    rows: Array | Sequence[Array],
-    codes: Codes,
-    names: list[str],
-    clock_unit: str,
-    options: ReadOptions,
-    note: str,
+    rows: Array | Sequence[Array], codes: Codes, names: list[str], options: ReadOptions
 ) -> RawRecording:
-    """Return bodies of rows of clock, image x, y, world x, y and orientation."""
-    clock, image_x, image_y, world_x, world_y, theta = rows
-    world = bool(world_x.any() or world_y.any()) and options.metres_per_pixel is None
-    x, y = (world_x, world_y) if world else (image_x, image_y)
+    """Return bodies of rows of frame or time, image x, y, world x, y and orientation."""
+    clock, *places, theta = rows
+    world = _in_world(places[2:], options)
+    x, y = places[2:] if world else places[:2]
     bodies = split_bodies(RawBody("", clock, x, y, theta), codes, names)
-    return _recording(bodies, clock_unit, world=world, note=note)
+    return _recording(bodies, "frame", world=world)
 
 
 def _columns(head: bytes) -> list[str]:
@@ -123,24 +110,21 @@ def _columns(head: bytes) -> list[str]:
 
 
 @naming_its_file
-def _read_one(path: Path) -> Table:
+def _read_one(path: Path) -> list[Array]:
     columns = _columns(read_head(path))
     if not columns:
         raise FormatError("the header is not that of a SwisTrack track file", line=1)
     table = read_table(path, TableLayout("\t", columns, 1, tuple(range(len(columns)))))
     if np.isnan(table.numbers[0]).any():
         raise FormatError("a row has no frame number")
-    return table
+    return [*table.numbers.values()]
 
 
 def _track_files(folder: Path) -> list[Path]:
     return sorted(file for file in folder.iterdir() if _FILE_NAME.fullmatch(file.name))
 
 
-PARTICLES = [
-    *("frame", "time", "x (image)", "y (image)", "x (world)", "y (world)"),
-    *("area", "orientation", "compactness"),
-]
+PARTICLES = ["frame", "time", *OLD[1:8]]
 
 
 class SwisTrackParticlesLoader:
@@ -163,11 +147,13 @@ class SwisTrackParticlesLoader:
         names = [*map(str, range(int(order.max()) + 1))]
         timed = options.frame_rate_hz is None
         rows = (_times(table) if timed else numbers[0], *(numbers[at] for at in (2, 3, 4, 5, 7)))
+        raw = _of_particles(rows, order, names, options)
+        raw.clock_unit = "s" if timed else "frame"
         note = (
             "particles.csv holds no identities: bodies are distinguished by their order in a frame"
         )
-        note = note if len(names) > 1 else ""
-        return _of_particles(rows, order, names, "s" if timed else "frame", options, note)
+        raw.notes = [note] if len(names) > 1 else []
+        return raw
 
 
 def _times(table: Table) -> Array:
@@ -209,9 +195,10 @@ class SwisTrackNmeaLoader:
         repeated = np.unique(np.stack([frame, ids]), axis=1).shape[1] < frame.size
         names = [str(index) for index in (range(int(order.max()) + 1) if repeated else labels)]
         of_row = order if repeated else codes.astype(np.int32)
+        raw = _of_particles(values, of_row, names, options)
         note = "ids repeat within a frame: bodies are distinguished by their order in the frame"
-        note = note if repeated else ""
-        return _of_particles(values, of_row, names, "frame", options, note)
+        raw.notes = [note] if repeated else []
+        return raw
 
 
 def _particles(path: Path) -> tuple[Array, Integers]:

@@ -71,35 +71,22 @@ class AnimalTALoader:
         names, _, skip, _ = read_header(path, delimiter=";")
         if names[:2] != ["Frame", "Time"]:
             raise FormatError("the first columns are not Frame and Time", line=1)
-        stacked = tuple(names[:6]) == ANIMALTA
-        if stacked:
-            bodies, frame, time = _stacked(path, names, skip)
+        if tuple(names[:6]) == ANIMALTA:
+            table = read_table(path, TableLayout(";", names, skip, (0, 1, 4, 5), (2, 3)))
+            targets = table.codes[3], [f"Ind{label}" for label in table.labels[3]]
+            named = codes_in_arenas((table.codes[2], table.labels[2]), targets)
+            frame, time, x, y = (table.numbers[column] for column in (0, 1, 4, 5))
         else:
-            bodies, columns = side_by_side(path, _PLACE, ";", clock=0)
-            frame, time = columns["Frame"], columns["Time"]
+            bodies, columns = side_by_side(path, _PLACE, ";")
+            frame, time, named = columns["Frame"], columns["Time"], None
         rate = None if options.frame_rate_hz is not None else _rate_of_frames(frame, time)
         timed = rate is None and options.frame_rate_hz is None
-        if timed:
-            order = np.argsort(frame, kind="stable")
-            for one in bodies:
-                places = np.searchsorted(frame[order], one.clock).clip(0, frame.size - 1)
-                one.clock = time[order][places]
-        return RawRecording(
-            bodies,
-            clock_unit="s" if timed else "frame",
-            length_unit="px",
-            frame_rate_hz=rate,
-            rows=frame.size,
-        )
-
-
-def _stacked(path: Path, names: list[str], skip: int) -> tuple[list[RawBody], Array, Array]:
-    table = read_table(path, TableLayout(";", names, skip, (0, 1, 4, 5), (2, 3)))
-    targets = [f"Ind{label}" for label in table.labels[3]]
-    codes, labels = codes_in_arenas((table.codes[2], table.labels[2]), (table.codes[3], targets))
-    frame, time, x, y = (table.numbers[column] for column in (0, 1, 4, 5))
-    bodies = split_bodies(RawBody("", frame, x, y), codes, labels)
-    return bodies, frame.copy(), time
+        clock = time if timed else frame
+        if named is None:
+            bodies = [replace(one, clock=clock) for one in bodies]
+        else:
+            bodies = split_bodies(RawBody("", clock, x, y), *named)
+        return RawRecording(bodies, "s" if timed else "frame", "px", frame_rate_hz=rate)
 
 
 def _rate_of_frames(frame: Array, time: Array) -> float | None:
@@ -114,11 +101,8 @@ def _rate_of_frames(frame: Array, time: Array) -> float | None:
     exact = float(np.ptp(frame) / np.ptp(time))
     if exact * 2 * HALF_DIGIT_S > 0.5 * np.ptp(time):
         return None  # too short a recording: several whole numbers agree
-    for rate in (float(round(exact)), exact):
-        if (
-            rate > 0.0
-            and (np.abs(time - time[0] - (frame - frame[0]) / rate) < 2 * HALF_DIGIT_S).all()
-        ):
+    for rate in filter(None, (float(round(exact)), exact)):
+        if (np.abs(time - time[0] - (frame - frame[0]) / rate) < 2 * HALF_DIGIT_S).all():
             return rate
     return None
 
@@ -211,13 +195,10 @@ class ToxTracLoader:
         bodies = split_bodies(RawBody("", clock, x, y), codes, labels)
         # Label 0 is a position that was predicted, not seen.
         predicted = int((label == 0.0).sum())
-        return RawRecording(
-            bodies,
-            clock_unit=unit_of_name(header[0]) if real else "frame",
-            length_unit=unit_of_name(header[3]) if real else "px",
-            y_axis="down",
-            notes=[f"positions that ToxTrac predicted, not seen: {predicted}"] if predicted else [],
-        )
+        note = f"positions that ToxTrac predicted, not seen: {predicted}"
+        units = [unit_of_name(header[at]) for at in (0, 3)] if real else ["frame", "px"]
+        notes = [note] if predicted else []
+        return RawRecording(bodies, units[0], units[1], y_axis="down", notes=notes)
 
 
 def _is_real_space(row: list[str]) -> bool:

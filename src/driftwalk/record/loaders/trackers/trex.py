@@ -57,16 +57,11 @@ class _Columns:
             theta = angle_between(*map(self.point, options.heading))
         elif "ANGLE" in self.arrays:
             theta = self.read("ANGLE")
-            theta[~np.isfinite(theta)] = np.nan
-        return RawRecording(
-            [RawBody(name, clock, x, y, theta)],
-            clock_unit="s" if timed else "frame",
-            length_unit=self.length_unit,
-            frame_rate_hz=self.frame_rate_hz,
-            has_keypoints=True,
-            y_axis="down",
-            notes=[ASSUMED] if self.cm_per_pixel is None else [],
-        )
+        bodies, clock_unit = [RawBody(name, clock, x, y, theta)], "s" if timed else "frame"
+        raw = RawRecording(bodies, clock_unit, self.length_unit, has_keypoints=True, y_axis="down")
+        raw.frame_rate_hz = self.frame_rate_hz
+        raw.notes = [ASSUMED] if self.cm_per_pixel is None else []
+        return raw
 
     def read(self, name: str) -> Array:
         """Return a column as a new array."""
@@ -188,11 +183,8 @@ def _first(arrays: Mapping[str, npt.NDArray[Any]], name: str) -> float | None:
 def _of_csv(path: Path) -> _Columns:
     """Return the columns of a table by their names without units."""
     names = first_row(path)
-    used = {
-        at: bare
-        for at, name in enumerate(names)
-        if _USED.fullmatch(bare := name.partition(" (")[0])
-    }
+    bare_names = enumerate(name.partition(" (")[0] for name in names)
+    used = {at: bare for at, bare in bare_names if _USED.fullmatch(bare)}
     if not used:
         raise FormatError("has no columns frame, X#wcentroid and Y#wcentroid", line=1)
     units = {unit_of_name(names[at]) for at, bare in used.items() if bare[0] in "XY"}
