@@ -9,7 +9,6 @@ keeps no other file from being read.
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
@@ -17,7 +16,7 @@ from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -34,16 +33,12 @@ from driftwalk.record.raw import (
     ReadOptions,
 )
 from driftwalk.record.stores.hdf5 import names_in
-from driftwalk.record.stores.npz import NPY, ZIP, members
+from driftwalk.record.stores.npz import ZIP, members
 from driftwalk.record.tables.in_memory import table_in_memory
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.tables.text_source import detect_delimiter, first_lines
 from driftwalk.record.text import encoding_notes, read_head
 from driftwalk.schema.stores.netcdf import HDF5, kind_of_file
-
-if TYPE_CHECKING:
-    pass
-
 
 OTHERS: Final = {
     b"CDF": "NetCDF 3",
@@ -55,8 +50,7 @@ OTHERS: Final = {
     b"{": "JSON",
     b"[": "JSON",
 }
-"""Starts of files of other kinds."""
-_NAME: Final = re.compile(rb"[A-Za-z_]\w{2,}")
+"""Starts of files of other kinds, and of damaged ones."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +88,6 @@ def contents_of(path: Path, head: bytes) -> Contents:
     if head.startswith(ZIP):
         names = tuple(sorted(members(path)))
         return Contents("npz", "NumPy's .npz" if names else "a zip file", names)
-    if head.startswith(NPY):
-        return Contents("npy", "NumPy's .npy", _fields_of_npy(head))
     for start, kind in OTHERS.items():
         if head.lstrip().startswith(start):
             return Contents("", kind, ())
@@ -109,20 +101,6 @@ def contents_of(path: Path, head: bytes) -> Contents:
     fields = [one for line in lines for one in split_fields(line, delimiter)]
     names = tuple(dict.fromkeys(one for one in fields if one and not is_number(one)))
     return Contents("table", "a table", names)
-
-
-def _fields_of_npy(head: bytes) -> tuple[str, ...]:
-    """Return names that stand in the start of a pickled dictionary, or the type of an array."""
-    end = head.find(b"\n") + 1
-    found = re.search(rb"\{.*?\}", head[:end])
-    try:
-        header = ast.literal_eval(found.group().decode("latin1")) if found else {}
-    except (ValueError, SyntaxError):
-        header = {}
-    if header.get("descr") != "|O":
-        return (f"array of {header.get('descr', 'unknown type')}",)
-    words = (word.decode() for word in _NAME.findall(head[end:]))
-    return tuple(dict.fromkeys(words))
 
 
 def unknown_file(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
@@ -141,12 +119,11 @@ def unknown_file(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
     if contents.container == "HDF5" and {"frames", "instances", "points"} <= set(contents.names):
         return "it is a SLEAP project: export it as analysis HDF5 or CSV"
     near = _near(contents, loaders)
-    found = [f"{name} ({lacks or 'it is damaged'})" for _, name, lacks in near[:3]]
+    found = ", ".join(f"{name} ({lacks or 'it is damaged'})" for _, name, lacks in near[:3])
+    nearest = f"if it is one that is read ({', '.join(loaders)})"
     if found:
-        nearest = f"the nearest are {', '.join(found)}; if it is one of these, name it"
-    else:
-        nearest = f"if it is one that is read ({', '.join(loaders)}), name it"
-    return f"it is {contents.described()}; {nearest} with `format`"
+        nearest = f"the nearest are {found}; if it is one of these"
+    return f"it is {contents.described()}; {nearest}, name it with `format`"
 
 
 def nearest_table(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
@@ -174,15 +151,12 @@ def _near(contents: Contents, loaders: Mapping[str, Any]) -> list[tuple[float, s
     near = []
     for name, loader in loaders.items():
         marks: tuple[Marks, ...] = getattr(loader, "marks", ())
-        shares = [
-            (len(set(one.names) & set(contents.names)) / len(one.names), one)
-            for one in marks
-            if one.container == contents.container
-        ]
-        if shares:
-            share, one = max(shares, key=lambda entry: entry[0])
+        found = []
+        for one in (one for one in marks if one.container == contents.container):
             missing = [f"'{mark}'" for mark in one.names if mark not in contents.names]
-            near.append((share, name, f"lacks {', '.join(missing[:4])}" if missing else ""))
+            lacks = f"lacks {', '.join(missing[:4])}" if missing else ""
+            found.append((1.0 - len(missing) / len(one.names), name, lacks))
+        near += sorted(found, key=lambda entry: -entry[0])[:1]
     near.sort(key=lambda entry: (-entry[0], entry[1]))
     anything = [entry for entry in near if entry[0] > 0.0]
     return anything or (near if contents.container != "table" else [])
@@ -271,9 +245,8 @@ def find_loader(path: Path, *, format: str | None = None, by_columns: bool = Fal
     known = loaders()
     broken = _foreign()[1]
     if format is not None and format not in known:
-        if format in broken:
-            raise InputError(f"`format` '{format}': {broken[format]}")
-        raise InputError(f"unknown `format` '{format}'; readable: {', '.join(known)}")
+        reason = f"unknown `format` '{format}'; readable: {', '.join(known)}"
+        raise InputError(f"`format` '{format}': {broken[format]}" if format in broken else reason)
     if not path.exists():
         raise FormatError("there is no such file", path=path)
     if format is not None:
@@ -302,10 +275,14 @@ class ForeignLoader:
     """A loader of another package, whose errors name the package."""
 
     def __init__(self, loader: Any, package: str) -> None:
+        lacking = [name for name in _MEMBERS if not hasattr(loader, name)]
+        if lacking:
+            raise TypeError(f"it has no {' and no '.join(lacking)}")
         self._loader = loader
         self.name = str(loader.name)
         self.description = str(loader.description)
         self.package = package
+        self._by = f"the loader '{self.name}' of the package {package}"
         self.failed = ""
         """Error of the last attempt to recognise a file, ``""`` where there was none."""
         self.marks: tuple[Marks, ...] = tuple(getattr(loader, "marks", ()))
@@ -317,36 +294,31 @@ class ForeignLoader:
             return float(self._loader.sniff(head, path))
         except Exception as error:  # whatever another package's code raises
             kind = type(error).__name__
-            self.failed = (
-                f"the loader '{self.name}' of the package {self.package} failed to recognise it: "
-                f"{kind}: {reason_of(error)}"
-            )
+            self.failed = f"{self._by} failed to recognise it: {kind}: {reason_of(error)}"
             return 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the file by the other package's code."""
-        by = f"the loader '{self.name}' of the package {self.package}"
         try:
-            raw = self._loader.read(path, options)
+            raw: RawRecording = self._loader.read(path, options)
         except FormatError as error:
-            reason, at = f"{' '.join(error.reason.split())} ({by})", (error.line, error.column)
-            raise FormatError(reason, path=error.path, line=at[0], column=at[1]) from error
+            line, column = error.line, error.column
+            reason = f"{' '.join(error.reason.split())} ({self._by})"
+            raise FormatError(reason, path=error.path, line=line, column=column) from error
         except InputError as error:
-            raise InputError(f"{reason_of(error)} ({by})") from error
+            raise InputError(f"{reason_of(error)} ({self._by})") from error
         except Exception as error:  # whatever another package's code raises
             kind = type(error).__name__
-            raise FormatError(f"{by} failed: {kind}: {reason_of(error)}") from error
-        wrong = _what_is_wrong(raw)
-        if wrong:
-            raise FormatError(f"{by} returned {wrong}")
-        recording: RawRecording = raw
-        recording.bodies = [_own(body) for body in recording.bodies]
-        return recording
+            raise FormatError(f"{self._by} failed: {kind}: {reason_of(error)}") from error
+        try:
+            _refuse_facts(raw)
+            raw.bodies = [_own(body) for body in raw.bodies]
+        except TypeError as error:
+            raise FormatError(f"{self._by} returned {error}") from error
+        return raw
 
 
-def foreign_loaders(
-    taken: Container[str],
-) -> tuple[dict[str, ForeignLoader], dict[str, str]]:
+def foreign_loaders(taken: Container[str]) -> tuple[dict[str, ForeignLoader], dict[str, str]]:
     """Return the loaders of the installed packages, and what is wrong with the broken ones.
 
     Both by name: of the format, and of the entry point.
@@ -366,11 +338,7 @@ def foreign_loaders(
     points = sorted(entry_points(group=GROUP), key=lambda point: (point.name, _package(point)))
     for point in points:
         try:
-            loader = point.load()
-            lacking = [name for name in _MEMBERS if not hasattr(loader, name)]
-            if lacking:
-                raise TypeError(f"it has no {' and no '.join(lacking)}")
-            foreign = ForeignLoader(loader, _package(point))
+            foreign = ForeignLoader(point.load(), _package(point))
         except Exception as error:  # whatever another package's code raises
             reason = f"{type(error).__name__}: {reason_of(error)}"
             broken[point.name] = f"the package {_package(point)} has a broken loader ({reason})"
@@ -389,10 +357,10 @@ def _package(point: EntryPoint) -> str:
     return point.dist.name if point.dist is not None else point.value
 
 
-def _what_is_wrong(raw: Any) -> str:
-    """Return what a loader must not return, ``""`` where all is well."""
+def _refuse_facts(raw: Any) -> None:
+    """Raise a `TypeError` that says what a loader must not return."""
     if not isinstance(raw, RawRecording):
-        return f"{type(raw).__name__}, and has to return a RawRecording"
+        raise TypeError(f"{type(raw).__name__}, and has to return a RawRecording")
     units = (
         ("clock_unit", raw.clock_unit, (*CLOCK_UNITS, "frame")),
         ("length_unit", raw.length_unit, (*LENGTH_UNITS, "px", "")),
@@ -401,28 +369,23 @@ def _what_is_wrong(raw: Any) -> str:
     )
     for name, value, known in units:
         if value not in known:
-            return f"{name} = {value!r}, which is none of {', '.join(map(repr, known))}"
+            raise TypeError(f"{name} = {value!r}, which is none of {', '.join(map(repr, known))}")
     if not raw.bodies:
-        return "no bodies"
-    for body in raw.bodies:
-        columns = {name: np.asarray(getattr(body, name)) for name in ("clock", "x", "y")}
-        if body.theta is not None:
-            columns["theta"] = np.asarray(body.theta)
-        for name, values in columns.items():
-            if values.dtype.kind not in "fiu" or values.shape != columns["clock"].shape[:1]:
-                return (
-                    f"{name} of body '{body.name}' as {values.dtype} of shape {values.shape}, and "
-                    f"it has to be numbers, one for each of the {columns['clock'].size} times"
-                )
-    return ""
+        raise TypeError("no bodies")
 
 
 def _own(body: RawBody) -> RawBody:
-    """Return a body whose arrays may be converted in place."""
-    named = {"clock": body.clock, "x": body.x, "y": body.y, "theta": body.theta}
-    copied: dict[str, Any] = {
-        key: np.array(one, dtype=np.float64) for key, one in named.items() if one is not None
-    }
+    """Return a body whose arrays may be converted in place, or raise a `TypeError`."""
+    names = ("clock", "x", "y", *(() if body.theta is None else ("theta",)))
+    columns: dict[str, Any] = {name: np.asarray(getattr(body, name)) for name in names}
+    times = columns["clock"]
+    for name, values in columns.items():
+        if values.dtype.kind not in "fiu" or values.shape != times.shape[:1]:
+            raise TypeError(
+                f"{name} of body '{body.name}' as {values.dtype} of shape {values.shape}, and it "
+                f"has to be numbers, one for each of the {times.size} times"
+            )
+    copied: dict[str, Any] = {name: np.array(one, float) for name, one in columns.items()}
     return replace(body, name=str(body.name), **copied)
 
 
@@ -499,11 +462,6 @@ def origin_of(
         raise InputError(f"{path}: no simulation, so it has no replicates: omit `replicate`")
     named = format or ("matrices" if options.y is not None else None)
     loader = find_loader(path, format=named, by_columns=bool(options.columns))
-    return Origin(
-        where=str(path),
-        name=text_of_name(path.name),
-        format=loader.name,
-        read=partial(naming_its_file(loader.read), path),
-        path=path,
-        guessed=format is None and loader.name == PLAIN,
-    )
+    read = partial(naming_its_file(loader.read), path)
+    guessed = format is None and loader.name == PLAIN
+    return Origin(str(path), text_of_name(path.name), loader.name, read, path, guessed)
