@@ -164,12 +164,8 @@ def _speed(track: Track) -> dict[str, Any]:
 
 
 def _turn_rate(theta: Array, interval: Array, near: Bools) -> dict[str, float]:
-    turned = np.diff(theta)
-    turned = (turned + np.pi) % (2.0 * np.pi) - np.pi
+    turned = (np.diff(theta) + np.pi) % (2.0 * np.pi) - np.pi
     rate = (turned[near] / interval[near])[np.isfinite(turned[near])]
     if not rate.size:
         return {}
-    return {
-        "turn_rate_mean_rad_s": float(rate.mean()),
-        "turn_rate_std_rad_s": float(rate.std()),
-    }
+    return {"turn_rate_mean_rad_s": float(rate.mean()), "turn_rate_std_rad_s": float(rate.std())}

@@ -313,14 +313,9 @@ def _assemble(
     if twice := totals["times_in_two_places"]:
         notes.append(f"times with rows in different places, of which the last is kept: {twice}")
     notes += [*plausibility_warnings(bodies), *jumps]
-    attrs["counts"] = json.dumps(
-        {
-            "rows_in_file": raw.rows,
-            **totals,
-            "per_body": {name: vars(found) for name, found in counts.items()},
-            "warnings": notes,
-        }
-    )
+    per_body = {name: vars(found) for name, found in counts.items()}
+    said = {"rows_in_file": raw.rows, **totals, "per_body": per_body, "warnings": notes}
+    attrs["counts"] = json.dumps(said)
     names = [body.name for body in bodies]
     recording = build_trajectory(time, x, y, theta, body=names, attrs=attrs)
     for name, meaning in raw.extra.items():

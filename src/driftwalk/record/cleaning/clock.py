@@ -201,12 +201,9 @@ def _rolls_over(known: Array, modulus: float) -> bool:
         return False
     over = steps[back] + modulus
     before, after = known[back] - first, known[back + 1] - first
-    return bool(
-        (over > 0).all()
-        and (over <= COUNTER.steps * np.median(ahead)).all()
-        and (before >= (1.0 - COUNTER.near) * modulus).all()
-        and (after <= COUNTER.near * modulus).all()
-    )
+    fits = (over > 0.0) & (over <= COUNTER.steps * np.median(ahead))
+    fits &= (before >= (1.0 - COUNTER.near) * modulus) & (after <= COUNTER.near * modulus)
+    return bool(fits.all())
 
 
 def starts_over(clock: Array) -> bool:
@@ -222,8 +219,7 @@ def starts_over(clock: Array) -> bool:
     ahead = steps[steps > 0]
     if not back.size or not ahead.size:
         return False
-    usual = float(np.median(ahead))
-    far = (-back > COUNTER.displaced * usual).all()
+    far = (-back > COUNTER.displaced * np.median(ahead)).all()
     return bool(far and back.size <= max(1.0, COUNTER.seldom * steps.size))
 
 

@@ -78,12 +78,7 @@ def find_jumps(body: RawBody, max_speed: float) -> Integers:
     return present[removed]
 
 
-def _best_chain(
-    t: Floats,
-    x: Floats,
-    y: Floats,
-    max_speed: float,
-) -> Integers:
+def _best_chain(t: Floats, x: Floats, y: Floats, max_speed: float) -> Integers:
     """Return the samples of the cheapest chain, in order.
 
     ``cost`` is that of the cheapest chain to end in a sample, less one for each sample up to there.
@@ -191,12 +186,9 @@ def impossible_steps(time: Array, x: Array, y: Array, *, diagonal: float) -> Imp
     speed[found] = np.nan
     others = speed[np.isfinite(speed)]
     fastest = min(float(others.max()), slowest) if others.size else slowest
-    return Impossible(
-        int(found.size),
-        float(length[found].max()),
-        float(time[found[0]]),
-        float(f"{math.sqrt(max(fastest, 1e-3 * slowest) * slowest):.2g}"),
-    )
+    between = float(f"{math.sqrt(max(fastest, 1e-3 * slowest) * slowest):.2g}")
+    longest, first = float(length[found].max()), float(time[found[0]])
+    return Impossible(int(found.size), longest, first, between)
 
 
 def arena_diagonal(

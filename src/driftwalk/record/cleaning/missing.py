@@ -139,9 +139,8 @@ def _far_places(x: Array, y: Array, near: Bools, far: Bools) -> list[tuple[str, 
     reached = np.flatnonzero(by_near)
     whole_there = (x[reached] % 1.0 == 0.0) & (y[reached] % 1.0 == 0.0)
     reached = reached[by_far[reached] | whole_there]
-    places, counts = np.unique(
-        np.column_stack([x[reached], y[reached]]), axis=0, return_counts=True
-    )
+    candidates = np.column_stack([x[reached], y[reached]])
+    places, counts = np.unique(candidates, axis=0, return_counts=True)
     for at in np.argsort(-counts, kind="stable")[:3]:
         px, py = places[at].tolist()
         there = (x == px) & (y == py)

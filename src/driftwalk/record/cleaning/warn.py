@@ -47,14 +47,12 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
         return ["no row holds a position"]
     warnings = []
     extent = max(span_of([values]) for body in bodies for values in (body.x, body.y))
-    if extent > PLAUSIBLE.largest_extent_m:
-        warnings.append(f"the positions span {extent:.3g} m: is the unit, or the scale, right?")
-    elif extent == 0.0:
+    only = "only " if extent < PLAUSIBLE.smallest_extent_m else ""
+    if extent == 0.0:
         warnings.append("the body never moves")
-    elif extent < PLAUSIBLE.smallest_extent_m:
-        warnings.append(
-            f"the positions span only {extent:.3g} m: is the unit, or the scale, right?"
-        )
+    elif only or extent > PLAUSIBLE.largest_extent_m:
+        span = f"{only}{extent:.3g} m"
+        warnings.append(f"the positions span {span}: is the unit, or the scale, right?")
     warnings += _clock_warnings(bodies)
     speeds = [0.0]
     for body in bodies:
@@ -198,9 +196,7 @@ def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
     for body in bodies:
         for name, values in (("x", body.x), ("y", body.y)):
             _refuse_beyond(body, name, values, EXTENT.farthest_m / scale)
-        known = [
-            np.abs(axis).max(where=np.isfinite(axis), initial=0.0) for axis in (body.x, body.y)
-        ]
+        known = [np.abs(one).max(where=np.isfinite(one), initial=0.0) for one in (body.x, body.y)]
         if 0.0 < max(known) < EXTENT.nearest_m / scale:
             raise InputError(
                 f"body '{body.name}' has no position that is further than {max(known):.3g} from "

@@ -210,17 +210,14 @@ def _labels(contents: Hdf5Contents, key: str, name: str, group: Any) -> list[Col
     """Return the names of the columns of a block, of one level or of several."""
     if text_of(group.attrs.get(f"{name}_variety", b"regular")) != "multi":
         return [(text,) for text in contents.texts(f"{key}/{name}")]
-    levels = range(int(group.attrs.get(f"{name}_nlevels", 0)))
-    texts = [contents.texts(f"{key}/{name}_level{level}") for level in levels]
-    codes = [contents.array(f"{key}/{name}_label{level}").tolist() for level in levels]
-    if any(
-        not 0 <= code < len(of) for of, column in zip(texts, codes, strict=True) for code in column
-    ):
-        raise FormatError(f"the names of the columns of '{key}' are damaged")
-    return [
-        tuple(texts[level][code] for level, code in enumerate(row))
-        for row in zip(*codes, strict=True)
-    ]
+    levels: list[list[str]] = []
+    for level in range(int(group.attrs.get(f"{name}_nlevels", 0))):
+        texts = contents.texts(f"{key}/{name}_level{level}")
+        codes = contents.array(f"{key}/{name}_label{level}").tolist()
+        if any(not 0 <= code < len(texts) for code in codes):
+            raise FormatError(f"the names of the columns of '{key}' are damaged")
+        levels.append([texts[code] for code in codes])
+    return [*zip(*levels, strict=True)]
 
 
 def _table(contents: Hdf5Contents, key: str, group: Any) -> Frame:
