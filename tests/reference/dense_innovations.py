@@ -265,7 +265,8 @@ def dense_filter(
                 s, P, M = s + K @ e, keep @ P @ keep.T + K @ R @ K.T, keep @ M
                 if restarted and not track["excluded"][k]:
                     restarted, undragged = False, (time[k] - last) / 2
-        if (s is None or track["excluded"][k]) and not np.isnan(value).any():
+        whole = not np.isnan([track[name][k] for name in ("x", "y", "theta")[:d]]).any()
+        if whole and (s is None or track["excluded"][k]):
             prior = track.get("velocity_prior", np.full((time.size, 6), np.nan))[k]
             known = not np.isnan(prior[0])
             velocity, spread = (
