@@ -304,7 +304,7 @@ def stretches(passes: Passes) -> Series:
         theta=np.zeros(800),
         angle=np.zeros(800),
         omega=0.3 + np.cos(time),
-        excluded=(rng.uniform(size=800) < 0.04).astype(np.uint8),
+        excluded=(rng.uniform(size=800) < 0.07).astype(np.uint8),
     )
 
 
@@ -326,7 +326,7 @@ def test_the_velocity_behind_a_contact_is_expected_from_the_nearest_ones(stretch
             own[k] = np.append(mean, series.omega[k + 2])
             # The straight line through the velocities 0.1 and 0.2 s later, at 0.05 s.
             begun[k] = np.append(sooner + (sooner - mean) * 0.05 / 0.1, series.omega[k + 2])
-    assert 15 < len(own) < len(contacts)
+    assert FILTER.least_prior_contacts < len(own) < len(contacts)
     means, starts = {}, {}
     for k in contacts:
         apart = {j: math.hypot(x[j] - x[k], y[j] - y[k]) for j in own if j != k}
@@ -339,9 +339,8 @@ def test_the_velocity_behind_a_contact_is_expected_from_the_nearest_ones(stretch
         np.testing.assert_allclose(
             flight, np.broadcast_to(np.append(starts[k], std), flight.shape), rtol=1e-9
         )
-    # Eight others say it, and seven do not.
-    few = list(own)
-    for count, known in ((FILTER.prior_contacts, False), (FILTER.prior_contacts + 1, True)):
+    few, enough = list(own), FILTER.least_prior_contacts
+    for count, known in ((enough - 1, False), (enough, True)):
         excluded = np.zeros(800, np.uint8)
         excluded[few[:count]] = 1
         prior = velocity_prior(replace(series, excluded=excluded), 0.01)
