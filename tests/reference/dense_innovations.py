@@ -266,9 +266,9 @@ def dense_filter(
                 if restarted and not track["excluded"][k]:
                     restarted, undragged = False, (time[k] - last) / 2
         whole = not np.isnan([track[name][k] for name in ("x", "y", "theta")[:d]]).any()
-        if whole and (s is None or track["excluded"][k]):
-            prior = track.get("velocity_prior", np.full((time.size, 6), np.nan))[k]
-            known = not np.isnan(prior[0])
+        prior = track.get("velocity_prior", np.full((time.size, 6), np.nan))[k]
+        known = not np.isnan(prior[0])
+        if whole and (s is None or (known and track["excluded"][k])):
             velocity, spread = (
                 (prior[:d], np.diag(prior[3 : d + 3] ** 2)) if known else (still, unknown)
             )
@@ -318,8 +318,8 @@ def make_track(time: Floats, seed: int = 5) -> dict[str, Any]:
 
 
 def difficult_track() -> dict[str, Any]:
-    """Uneven clock, missing samples, a gap of 0.7 s and one of 3 s, behind which the velocity has a
-    prior, excluded ones, an outlier, two in a row, and a jump."""
+    """Uneven clock, missing samples, a gap of 0.7 s and one of 3 s, excluded ones, an outlier, two
+    in a row, and a jump. Behind the gap of 3 s and two contacts the velocity has a prior."""
     rng = np.random.default_rng(11)
     time = np.cumsum(rng.uniform(0.02, 0.16, 160))
     time[60:] += 0.7
@@ -332,5 +332,6 @@ def difficult_track() -> dict[str, Any]:
     track["y"][[50, 51]] += [0.05, -0.04]
     track["x"][130:] += 0.05
     track["velocity_prior"] = np.full((160, 6), np.nan)
-    track["velocity_prior"][100:] = [0.02, -0.01, 0.3, 0.02, 0.03, 0.5]
+    track["velocity_prior"][88:] = [0.02, -0.01, 0.3, 0.02, 0.03, 0.5]
+    track["velocity_prior"][32] = [-0.01, 0.03, -0.2, 0.03, 0.02, 0.4]
     return track

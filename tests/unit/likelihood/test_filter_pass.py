@@ -346,13 +346,17 @@ def test_the_velocity_behind_a_contact_is_expected_from_the_nearest_ones(stretch
         prior = velocity_prior(replace(series, excluded=excluded), 0.01)
         assert prior is not None
         assert np.isfinite(prior[few[0]]).all() == known
+    # Where the velocities scatter by more than 0.1 m/s, nothing is expected behind a contact.
+    wild = velocity_prior(replace(series, x=40.0 * x, y=40.0 * y), 0.4)
+    assert wild is not None
+    assert np.isnan(wild[contacts]).all()
 
 
 def test_noise_of_the_camera_behind_contacts_is_hardly_drag(passes: Passes) -> None:
     """2,400 flights of 0.6 s to and fro through still water; C_d is known to 1.3 %.
 
-    Where nothing is expected of the velocity behind a contact, C_d is 11 % too large with the
-    angle in the state, and 4 % with it as an input.
+    Where nothing is expected of the velocity behind a contact, the filter does not begin again, and
+    these contacts displace the block, too.
     """
     rng = np.random.default_rng(0)
     flights, samples, drag, intensity, noise = 2400, 7, 0.45, 1e-7, 3e-4
@@ -395,7 +399,7 @@ def test_noise_of_the_camera_behind_contacts_is_hardly_drag(passes: Passes) -> N
         curve = np.polyfit(away, fall, 2)
         return float(-0.5 * curve[1] / curve[0])
 
-    assert off(None) > 0.03
+    assert abs(off(None)) > 0.03
     assert abs(off(velocity_prior(series, 0.01))) < 0.03
 
 

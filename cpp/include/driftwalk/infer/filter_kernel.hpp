@@ -105,11 +105,14 @@ private:
       write_nothing(row);
     }
     // A contact within the last interval may have displaced the block, too.
-    if (found.whole && (!state_.open || track_.excluded[k] != 0)) {
+    const double* prior =
+        track_.velocity_prior == nullptr ? nullptr : track_.velocity_prior + 6 * k;
+    const bool expected = prior != nullptr && prior[0] == prior[0];
+    if (found.whole && (!state_.open || (expected && track_.excluded[k] != 0))) {
       const double still[D] = {};
       open(found, still);
-      if (track_.velocity_prior != nullptr) {
-        take_velocity_prior(track_.velocity_prior + 6 * k);
+      if (expected) {
+        take_velocity_prior(prior);
       }
     }
     if (found.there) {
@@ -144,9 +147,6 @@ private:
   }
 
   void take_velocity_prior(const double* prior) {
-    if (prior[0] != prior[0]) {
-      return;
-    }
     for (int a = 0; a < D; ++a) {
       state_.mean[a + D] = prior[a];
       state_.covariance[a + D][a + D] = prior[a + 3] * prior[a + 3];

@@ -80,8 +80,9 @@ struct Track {
   const double* strength;
   const std::uint8_t* excluded; // 1: the interval that ends here says nothing about the water
   std::int64_t samples;
-  // Mean and standard deviation of vx, vy, omega if the state begins at the sample, as at all that
-  // are excluded, [samples][6] [m/s, rad/s]; null, or NaN: 0 and that of an unknown speed.
+  // Mean and standard deviation of vx, vy, omega if the state begins at the sample, as it does
+  // where one is excluded and they are known, [samples][6] [m/s, rad/s]; null, or NaN: 0 and that
+  // of an unknown speed.
   const double* velocity_prior = nullptr;
 };
 

@@ -58,6 +58,9 @@ class FilterPolicy(NamedTuple):
     """Contacts with a flight behind them below which they say too little of its velocity. Chosen by
     hand: with 9 flights of a real termite the fit found no solution; of ten held-out recordings of
     studies/verdict at the wall nine have 50 and more."""
+    largest_prior_std: float = 0.1
+    """Standard deviation of a velocity above which nothing is expected [m/s]: as much as a velocity
+    may be where nothing is known of it (`unknown_speed` of the filter)."""
     settling_samples: int = 3
     """Samples left out after a missing frame when other explanations of an error are tried: in
     these a wrong place counts in the filter's velocity. Chosen by hand."""
@@ -500,16 +503,24 @@ def velocity_prior(series: Series, radius: float) -> Floats | None:
         sooner[begun] = (early + (early - motion) * (half - 1) / half)[at]
         mean[touching], start[touching] = (one[nearest].mean(axis=1) for one in (own, sooner))
     rows = np.full((begins.size, 6), np.nan)
-    for kind in (touching, ~touching):
-        known = kind & np.isfinite(mean + own).all(axis=1)
-        if np.count_nonzero(known) >= FILTER.least_prior_stretches:
-            std = np.sqrt(((own - mean)[known] ** 2).mean(axis=0))
-            rows[kind] = np.column_stack([start[kind], np.broadcast_to(std, start[kind].shape)])
+    for kind, most in ((touching, FILTER.largest_prior_std), (~touching, math.inf)):
+        rows[kind] = _expected(start[kind], mean[kind], own[kind], most)
     if not np.isfinite(rows).any():
         return None
     prior = np.full((series.time.size, 6), np.nan)
     prior[there] = rows[passage]
     return prior
+
+
+def _expected(start: Floats, mean: Floats, own: Floats, most: float) -> Floats:
+    """Return means and standard deviations, NaN where few are known or they scatter too much."""
+    known = np.isfinite(mean + own).all(axis=1)
+    found = np.full((len(start), 6), np.nan)
+    if np.count_nonzero(known) >= FILTER.least_prior_stretches:
+        std = np.sqrt(((own - mean)[known] ** 2).mean(axis=0))
+        if std[:2].max() <= most:
+            found[:] = np.column_stack([start, np.broadcast_to(std, start.shape)])
+    return found
 
 
 def _without_contacts(series: list[Series], block: Block) -> list[Series]:
