@@ -66,7 +66,8 @@ class SelectionPolicy(NamedTuple):
     """Least jitter of the time stamps [s]."""
     angle_offset_deg: float = 1.0
     """Least offset of the angle [degrees]. The eight strips of a face feign up to 1.2 degrees in
-    blocks that float and spin fast (studies/verdict: of two such offsets none is left with 32)."""
+    blocks that float and spin fast (two recordings of studies/verdict; one of them was fitted again
+    with 32, and no offset was left)."""
     marker: float = 0.012
     """Least offset of the marker, in sides of the block."""
     strength: float = 0.01
