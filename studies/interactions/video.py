@@ -21,8 +21,8 @@ import numpy as np
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.assembly.lattice.bonds import JOINING, PARTING
-from driftwalk.assembly.outcomes.event_rates import bridges_of
+from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
+from driftwalk.assembly.outcomes.steady_state import bridges_of
 from driftwalk.cli.main import main as driftwalk
 
 RECORDINGS: Final = 40

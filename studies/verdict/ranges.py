@@ -9,6 +9,7 @@ SEEDS: Final = {
     "held-out": 72_000,
     "confirmation": 73_000,
     "confirmation-2": 74_000,
+    "confirmation-3": 75_000,
 }
 """Choices may be made on the first. The README names those that errors on the next two led to."""
 

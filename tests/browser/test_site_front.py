@@ -23,7 +23,7 @@ from browser.all_kinds import page_of
 from browser.conftest import DESKTOP, PHONE, Visit
 from browser.first_motion import LOOP, require_soon
 from browser.readable import faults
-from driftwalk.page.chapters import in_chapters
+from driftwalk.page.run_page import in_chapters
 from driftwalk.page.sections.fit import fit_sections
 
 pytestmark = pytest.mark.browser

@@ -15,6 +15,7 @@ from driftwalk.assembly.outcomes.class_names import (
     class_cells,
     class_name,
     class_shapes,
+    kind_classes,
     merge_chirality,
     outcome_classes,
     sort_classes,
@@ -30,8 +31,6 @@ from driftwalk.assembly.outcomes.distribution import (
     outcome_distribution,
     sampling_variance,
 )
-from driftwalk.assembly.outcomes.event_rates import rate_interval
-from driftwalk.assembly.outcomes.kind_classes import kind_classes
 from driftwalk.assembly.outcomes.l1 import (
     L1NoiseFloor,
     PairwiseL1,
@@ -41,7 +40,7 @@ from driftwalk.assembly.outcomes.l1 import (
     pairwise_l1,
 )
 from driftwalk.assembly.outcomes.sizes import assembly_sizes
-from driftwalk.assembly.outcomes.steady_state import steady_state
+from driftwalk.assembly.outcomes.steady_state import rate_interval, steady_state
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
 from driftwalk.assembly.pull.attraction import attraction
 from driftwalk.assembly.recordings import classify

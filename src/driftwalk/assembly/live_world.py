@@ -11,15 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.lattice.bonds import CLOSING, JOINING, PARTING, BondGraph
 from driftwalk.assembly.lattice.join_history import LatticeWorld
-from driftwalk.assembly.lattice.joined_faces import ROUNDING
-from driftwalk.assembly.lattice.typed_faces import face_table
-from driftwalk.assembly.outcomes.disc_contacts import disc_class
+from driftwalk.assembly.lattice.joined_faces import ROUNDING, face_table
+from driftwalk.assembly.lattice.rigid_joins import CLOSING, JOINING, PARTING, BondGraph
+from driftwalk.assembly.outcomes.class_names import disc_class
 from driftwalk.assembly.pull.tables import block_pull
-from driftwalk.assembly.runs.bonds import require_bonds
+from driftwalk.assembly.runs.bonds import glued_cells, require_bonds
 from driftwalk.assembly.runs.dataset import times_of
-from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
 from driftwalk.assembly.runs.start import require_room
 from driftwalk.core.arrays import Floats

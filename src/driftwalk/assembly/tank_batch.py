@@ -13,10 +13,10 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import ROUNDING
-from driftwalk.assembly.outcomes.disc_contacts import disc_class
+from driftwalk.assembly.outcomes.class_names import disc_class
 from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.runs.bonds import glued_cells
 from driftwalk.assembly.runs.dataset import times_of
-from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.assembly.runs.plan import (
     MOST_STEPS,
     Backend,

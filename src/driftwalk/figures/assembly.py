@@ -1,4 +1,4 @@
-"""The figures of self-assembly, and of its sensitivity analysis."""
+"""The figures of self-assembly, of its sensitivity analysis, and of a policy of control."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from driftwalk.plot.assembly_courses import (
     plot_survival,
 )
 from driftwalk.plot.components import plot_biplot
+from driftwalk.plot.control import plot_control_run, plot_control_shares, plot_policy
 from driftwalk.plot.kinetics import plot_class_graph, plot_predicted_shares
 from driftwalk.plot.outcome_bars import plot_outcomes
 from driftwalk.plot.outcome_posterior import plot_data_widths, plot_outcome_posterior
@@ -301,3 +302,51 @@ def yield_figures(yields: xr.Dataset) -> Figures:
         "front": lambda: style.figure_of(plot_yield_front(yields)),
         "settings": lambda: style.figure_of(plot_yield_settings(yields)),
     }
+
+
+def policy_figures(policy: xr.Dataset) -> Figures:
+    """Return the figure of a policy.
+
+    Parameters
+    ----------
+    policy : xarray.Dataset
+        A `control_policy`.
+
+    Returns
+    -------
+    dict of str to callable
+        ``policy``.
+
+    Examples
+    --------
+    ``write_figures(policy_figures(policy), "policy/figures")``
+    """
+    return {"policy": lambda: style.figure_of(plot_policy(policy))}
+
+
+def trial_figures(control_test: xr.Dataset, path: xr.Dataset | None = None) -> Figures:
+    """Return the figures of a test: the target over time, and the decisions of one run.
+
+    Parameters
+    ----------
+    control_test : xarray.Dataset
+        A `control_test`.
+    path : xarray.Dataset, optional
+        The `assembly_path` of the run that it shows.
+
+    Returns
+    -------
+    dict of str to callable
+        ``shares`` and ``run``, with `path` also ``film_strip``.
+
+    Examples
+    --------
+    ``write_figures(trial_figures(found), "test/figures")``
+    """
+    figures: Figures = {
+        "shares": lambda: style.figure_of(plot_control_shares(control_test)),
+        "run": lambda: style.figure_of(plot_control_run(control_test)),
+    }
+    if path is not None:
+        figures["film_strip"] = lambda: style.figure_of(plot_film_strip(path)[0])
+    return figures

@@ -1,21 +1,30 @@
-"""The regular grid over a tank: square cells, nodes at their centres, values between them."""
+"""The regular grid over a tank: square cells, nodes at their centres, values between them.
+
+Rows x, y, u, v are sorted onto it, and the flow of a round tank is stretched to a larger one that
+is stirred alike.
+"""
 
 from __future__ import annotations
 
+import json
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
 from driftwalk.schema import check_flow_field
 
 if TYPE_CHECKING:
     import xarray as xr
 import math
-from dataclasses import dataclass
 
 from driftwalk.flow.arena import Outline
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -204,3 +213,144 @@ def _frame(flow: xr.Dataset, name: str, time: float | None) -> Array:
     after = int(np.clip(np.searchsorted(frames, at, side="right"), 1, frames.size - 1))
     part = (at - frames[after - 1]) / (frames[after] - frames[after - 1])
     return np.asarray((1.0 - part) * values[after - 1] + part * values[after])
+
+
+def stretch_flow(field: xr.Dataset, *, diameter: float) -> xr.Dataset:
+    """Return the flow of a round tank stretched to a tank of another diameter.
+
+    The water has the same velocity at the same share of the radius. That is an assumption: no
+    recording of one tank tells how the water moves in another.
+
+    Parameters
+    ----------
+    field : xarray.Dataset
+        A `flow_field` that knows its tank, a circle.
+    diameter : float
+        Of the other tank [m].
+
+    Returns
+    -------
+    xarray.Dataset
+        A `flow_field`; ``attrs["stretched_by"]`` is the ratio of the diameters.
+
+    Raises
+    ------
+    InputError
+        When the field knows no tank, or a tank of another shape, or the diameter is not above 0.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> wide = dw.flow.stretch_flow(dw.tank30_flow(), diameter=3.0)
+    >>> wide.attrs["stretched_by"], round(float(wide["x"].max()), 2)
+    (10.0, 1.47)
+    """
+    arena = json.loads(field.attrs.get("arena", "{}"))
+    if arena.get("shape") != "circle":
+        raise InputError(
+            "a flow is stretched from one round tank to another, and this field's is not"
+        )
+    if not diameter > 0.0:
+        raise InputError(f"diameter must be above 0 m, got {diameter}")
+    ratio = diameter / float(arena["diameter_m"])
+    center = [ratio * float(place) for place in arena.get("center_m", (0.0, 0.0))]
+    attrs = {
+        **field.attrs,
+        "arena": json.dumps({**arena, "diameter_m": diameter, "center_m": center}),
+        "stretched_by": ratio * float(field.attrs.get("stretched_by", 1.0)),
+    }
+    if "cell_size_m" in attrs:
+        attrs["cell_size_m"] = ratio * float(attrs["cell_size_m"])
+    axes = {axis: (axis, ratio * field[axis].values, field[axis].attrs) for axis in ("x", "y")}
+    return field.assign_coords(axes).assign_attrs(attrs)
+
+
+@dataclass(frozen=True)
+class FieldRows:
+    """A velocity field as a table, a row per node."""
+
+    line: Indices
+    """Line of the file, from 1, shape (n,)."""
+    x: Array
+    """Position x, shape (n,)."""
+    y: Array
+    """Position y, shape (n,)."""
+    u: Array
+    """Velocity along x, shape (n,)."""
+    v: Array
+    """Velocity along y, shape (n,)."""
+
+
+@dataclass(frozen=True)
+class GriddedField:
+    """A velocity field on a regular grid."""
+
+    x: Array
+    """Nodes along x, shape (nx,)."""
+    y: Array
+    """Nodes along y, shape (ny,)."""
+    velocity: Array
+    """Velocities, shape (ny, nx, 2)."""
+
+
+def grid_rows(rows: FieldRows) -> GriddedField:
+    """Put the rows of a file on their grid.
+
+    Raises
+    ------
+    FormatError
+        When a node stands in two rows, is missing, or the nodes are not evenly spaced.
+    """
+    x, column = _axis("x", rows.x, rows.line)
+    y, row = _axis("y", rows.y, rows.line)
+    node = row * x.size + column
+    _refuse_duplicates(node, rows)
+    order = np.argsort(node)
+    # No list of all nodes: scattered rows may span a grid of a billion of them.
+    absent = x.size * y.size - node.size
+    if absent:
+        moved = np.flatnonzero(node[order] != np.arange(node.size))
+        j, i = divmod(int(moved[0]) if moved.size else node.size, x.size)
+        raise FormatError(
+            f"the grid of {x.size} x {y.size} nodes lacks {absent} of them, the first at "
+            f"x = {x[i]:.6g}, y = {y[j]:.6g}: write a row for every node"
+        )
+    velocity = np.column_stack([rows.u, rows.v])[order].reshape(y.size, x.size, 2)
+    return GriddedField(x, y, velocity)
+
+
+def _axis(name: str, values: Array, line: Indices) -> tuple[Array, Indices]:
+    """Return the nodes along an axis and the number of each row's node."""
+    order = np.argsort(values, kind="stable")
+    width = float(np.ptp(values))
+    if width == 0.0:
+        raise FormatError(f"all rows have the same {name}: a grid needs 2 at least")
+    is_new = np.concatenate([[False], np.diff(values[order]) > 1e-6 * width])
+    number = np.empty(values.size, dtype=np.intp)
+    number[order] = np.cumsum(is_new)
+    count = np.bincount(number)
+    nodes = np.bincount(number, weights=values) / count
+    even = np.linspace(nodes[0], nodes[-1], nodes.size)
+    # Positions are printed with few digits.
+    if abs(nodes - even).max() > 0.02 * (even[1] - even[0]):
+        # Most likely one row has a wrong position, which makes a separate line of nodes.
+        rarest = int(count.argmin())
+        at = int(np.flatnonzero(number == rarest)[0])
+        raise FormatError(
+            f"the nodes along {name} are not evenly spaced; {name} = {values[at]:.6g} stands in "
+            f"{count[rarest]} of {values.size} rows",
+            line=int(line[at]),
+        )
+    return round_nodes(even), number
+
+
+def _refuse_duplicates(node: Indices, rows: FieldRows) -> None:
+    order = np.argsort(node, kind="stable")
+    again = np.flatnonzero(np.diff(node[order]) == 0)
+    if again.size:
+        first, second = order[again[0]], order[again[0] + 1]
+        raise FormatError(
+            f"the node x = {rows.x[second]:.6g}, y = {rows.y[second]:.6g} stands in line "
+            f"{rows.line[first]} already",
+            line=int(rows.line[second]),
+        )

@@ -8,21 +8,41 @@ estimated). The restricted likelihood integrates the coefficients out instead. T
 the profile of the negative log likelihood; its minimum over ln C_d is the estimate. The stochastic
 force comes out too small in the same way, as a variance does when means are estimated, by one or
 two parts in a hundred: one Newton step with the slope of the same determinant puts it right.
+
+**How much of the correction is due** where velocities do not forget. With dv = -kappa (v - phi'c)
+dt + sigma dW, c fitted and A the information on c with its prior in M = (A + Lambda)^-1, the score
+of ln kappa at the fitted c is too large by
+
+    tr(M B),   B = integral of kappa_t^2 phi_t psi_t' / q,   dpsi/dt = kappa (phi - psi)
+
+to first order; psi is what the velocity remembers of the flow. The slope of ln det / 2 in the
+restricted likelihood is tr(M A), which is the same only where the velocity forgets faster than the
+body crosses the support of a coefficient (Nickell 1981).
+
+The prior pulls the fitted c from the true one by M Lambda c, which adds
+
+    tr(M A M Lambda) - c' Lambda M A M Lambda c + D' M Lambda c
+
+with D = -integral of kappa_t^2 (v - phi'c) phi / q, the information that c shares with ln kappa. Of
+flows as the prior has them all of it is tr(M A) on average: the restricted likelihood is right.
+Real flows are smoother, so the sum is that of the fitted c.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.arrays import Floats
-from driftwalk.likelihood.filter.forgetting import Pull, due_share, pull_of_prior
+from driftwalk.core.arrays import Bools, Floats
+from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import INTENSITIES, Point
+from driftwalk.likelihood.filter.series import FILTER, Series
 from driftwalk.likelihood.newton import Mode, ModeSearch, known_numbers_variance
 from driftwalk.likelihood.refuse import cholesky
+from driftwalk.likelihood.spline import Spline, basis_matrix
 
 
 class RemlPolicy(NamedTuple):
@@ -183,7 +203,7 @@ def _minimum(found: list[Profile], share: float = 1.0) -> tuple[float, float]:
     """Return the minimum of the criterion through some points, and its standard deviation.
 
     A share of the determinant's slope counts, and the pull of the prior
-    (`driftwalk.likelihood.filter.forgetting`).
+    (`driftwalk.likelihood.reml`).
 
     The standard deviation is infinite where there is no minimum near the points. The pull is not in
     it: with the true coefficients it hardly depends on C_d, so its slope is an error of the fitted.
@@ -225,3 +245,100 @@ def _coefficients_at(found: list[Profile], nearest: Profile, log_drag: float) ->
     second = min(others, key=lambda one: abs(one.log_drag - log_drag))
     share = (log_drag - nearest.log_drag) / (second.log_drag - nearest.log_drag)
     return nearest.coefficients + share * (second.coefficients - nearest.coefficients)
+
+
+BLOCK = 4096
+"""Samples whose bases are held at once."""
+
+
+class Pull(NamedTuple):
+    """The part of the score of ln C_d that comes from the prior's pull on the coefficients."""
+
+    slope: float = 0.0
+    """D' M Lambda c."""
+    share: float = 0.0
+    """The rest, as a share of tr(M A)."""
+
+
+def pull_of_prior(sums: Sums, added: Sums, factor: Any, step: Floats, part: float = 1.0) -> Pull:
+    """Return what the pull adds at `step` from the coefficients of the sums, a part of it.
+
+    `added` are the sums with the prior in them, `factor` the Cholesky factor of their information
+    on the coefficients.
+    """
+    from scipy.linalg import cho_solve
+
+    information = sums.information[:-1, :-1]
+    prior = added.information[:-1, :-1] - information
+    away = cho_solve(factor, sums.score[:-1] - added.score[:-1] + prior @ step)
+    lost = cho_solve(factor, prior)
+    both = float(np.trace(lost) - np.sum(lost * lost.T))
+    whole = len(lost) - float(np.trace(lost))
+    return Pull(
+        part * float(sums.information[-1, :-1] @ away),
+        part * (both - float(away @ information @ away)) / whole,
+    )
+
+
+def due_share(passes: Passes, prior: Floats, point: Point) -> float:
+    """Return tr(M B) / tr(M A) at a point, of a disc: its drag depends on the slip alone.
+
+    `prior` is Lambda of one component. Of a flow in layers the mean counts.
+    """
+    due = whole = 0.0
+    for flow in range(passes.flows):
+        one, other = (np.zeros_like(prior) for _ in range(2))
+        for series in passes.series:
+            if series.flow == flow:
+                _add_series(passes, series, point.in_flow(flow), one, other)
+        weight = np.linalg.inv(one + prior)
+        due += float(np.sum(weight * other.T))
+        whole += float(np.sum(weight * one))
+    return due / whole
+
+
+def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other: Floats) -> None:
+    """Add A and B of a series."""
+    body, spline = passes.body, passes.spline
+    # Many samples within a tenth of a second tell the same.
+    states, time = passes.states(series, point)[:: series.pooled], series.time[:: series.pooled]
+    excluded = np.maximum.reduceat(series.excluded, np.arange(0, series.time.size, series.pooled))
+    mean = point.coefficients.reshape(-1, spline.size)[:2]
+    scale = 0.5 * body.water_density * body.side * body.depth / body.mass
+    step = np.diff(time, prepend=time[0])
+    seen = np.asarray(np.isfinite(states).all(axis=1))
+    states = np.where(seen[:, None], states, 0.0)
+    lost = np.any([excluded != 0, ~seen, step > FILTER.longest_gap_s], axis=0)
+    memory = np.zeros(spline.size)
+    for begin in range(0, time.size, BLOCK):
+        part = slice(begin, begin + BLOCK)
+        rows = _bases(spline, states[part, 0], states[part, 1])
+        slip = np.hypot(*(mean @ rows.T - states[part, 2:].T))
+        # Along the slip the drag k |w| w pulls with 2 k |w|, across it with k |w|: their mean.
+        rate = 1.5 * scale * math.exp(point.log_drag) * slip
+        kept, memory = remembered(rows, rate * step[part], lost[part], memory)
+        gains = np.where(lost[part], 0.0, rate**2 * step[part] / math.exp(point.log_intensity))
+        one += rows.T @ (gains[:, None] * rows)
+        other += rows.T @ (gains[:, None] * kept)
+
+
+def remembered(rows: Floats, turns: Floats, lost: Bools, memory: Floats) -> tuple[Floats, Floats]:
+    """Return the means of psi over steps of constant phi, shape (n, coefficients), and psi after.
+
+    `turns` are the lengths of the steps in memory times, (n,); nothing is remembered over a step
+    that is lost.
+    """
+    left = np.where(lost, 0.0, np.exp(-turns))
+    share = np.where(turns > 1e-9, -np.expm1(-turns) / np.maximum(turns, 1e-9), 1.0)
+    kept = np.empty_like(rows)
+    for k, row in enumerate(rows):
+        kept[k] = share[k] * memory + (1.0 - share[k]) * row
+        memory = np.zeros_like(memory) if lost[k] else left[k] * memory + (1.0 - left[k]) * row
+    return kept, memory
+
+
+def _bases(spline: Spline, x: Floats, y: Floats) -> Floats:
+    """Return all basis functions at places, shape (n, coefficients of one component)."""
+    along_x = basis_matrix((x - spline.origin_x) / spline.spacing, spline.columns)
+    along_y = basis_matrix((y - spline.origin_y) / spline.spacing, spline.rows)
+    return (along_y[:, :, None] * along_x[:, None, :]).reshape(x.size, -1)

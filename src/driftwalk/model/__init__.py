@@ -2,10 +2,9 @@
 
 from driftwalk.model.assembly import Assembly
 from driftwalk.model.binding import Binding, read_binding
-from driftwalk.model.block import Block
+from driftwalk.model.block import Block, Flow, Forces
 from driftwalk.model.calibration import Calibration
 from driftwalk.model.fit import Fit
-from driftwalk.model.forces import Flow, Forces
 from driftwalk.model.recording import Columns, Observation, Recording, Steps
 from driftwalk.model.recover import Recover
 from driftwalk.model.sensitivity import Sensitivity

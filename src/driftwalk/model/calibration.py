@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.grid import MOST_SETTINGS, check_axis, grid_values
-from driftwalk.model.forces import DragCoefficient, ForceStd
+from driftwalk.model.block import DragCoefficient, ForceStd
 from driftwalk.model.section import Quantity, Section, Seed
 
 DragCoefficientStep = Annotated[float, Quantity("1", gt=0, le=100)]

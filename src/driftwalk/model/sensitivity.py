@@ -11,8 +11,8 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
 from driftwalk.model.binding import faces_text
+from driftwalk.model.block import DragCoefficient, ForceStd
 from driftwalk.model.calibration import ForceGrid
-from driftwalk.model.forces import DragCoefficient, ForceStd
 from driftwalk.model.interaction import MagnetText, parse_magnet
 from driftwalk.model.section import Quantity, Seed
 

@@ -13,10 +13,9 @@ from pydantic import Field, model_validator
 from driftwalk.core.errors import ConfigurationError, FormatError, did_you_mean
 from driftwalk.core.text.toml_text import parse_toml, read_toml
 from driftwalk.model.assembly import Assembly
-from driftwalk.model.block import Block
+from driftwalk.model.block import Block, Flow, Forces
 from driftwalk.model.calibration import Calibration
 from driftwalk.model.fit import Fit
-from driftwalk.model.forces import Flow, Forces
 from driftwalk.model.interaction import Interaction
 from driftwalk.model.recording import Observation, Recording, Steps
 from driftwalk.model.recover import Recover

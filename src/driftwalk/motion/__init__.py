@@ -6,11 +6,17 @@ from driftwalk.motion.choose import feels_others, is_family_name, models, motion
 from driftwalk.motion.external_program.program import ProgramModel
 from driftwalk.motion.family import MEMBERS, PARTS, Member, Part, ParticleModel
 from driftwalk.motion.function import FunctionModel, Scene
-from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Worlds
+from driftwalk.motion.protocol import (
+    Details,
+    MotionModel,
+    Scores,
+    ScoresItself,
+    WorldRandom,
+    Worlds,
+)
 from driftwalk.motion.score import score_worlds
 from driftwalk.motion.simulated import model_start, simulate_motion
 from driftwalk.motion.values import estimated_values, known_values, models_knowing
-from driftwalk.motion.worlds import WorldRandom
 from driftwalk.schema import Parameter
 
 __all__ = [

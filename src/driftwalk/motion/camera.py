@@ -9,8 +9,7 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Floats, Keys
 from driftwalk.core.random_streams import MotionStream
-from driftwalk.motion.protocol import Worlds
-from driftwalk.motion.worlds import WorldRandom
+from driftwalk.motion.protocol import WorldRandom, Worlds
 from driftwalk.schema.trajectory import wrap_angle
 from driftwalk.simulation.backend import STATUS, wall_edges
 

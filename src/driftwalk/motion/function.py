@@ -14,9 +14,15 @@ from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion.camera import observe_worlds
-from driftwalk.motion.protocol import Values, Worlds
+from driftwalk.motion.protocol import (
+    Values,
+    WorldRandom,
+    Worlds,
+    in_words,
+    world_batches,
+    world_starts,
+)
 from driftwalk.motion.ranges import Range, given_by_name, range_parameter, with_given
-from driftwalk.motion.worlds import WorldRandom, in_words, world_batches, world_starts
 from driftwalk.schema import Parameter
 from driftwalk.simulation.initial import Start
 

@@ -19,9 +19,8 @@ from driftwalk.motion.block import BlockModel
 from driftwalk.motion.external_program.program import ProgramModel
 from driftwalk.motion.family import ParticleModel
 from driftwalk.motion.family.particle import time_step_of
-from driftwalk.motion.protocol import MotionModel, Worlds
+from driftwalk.motion.protocol import MotionModel, Worlds, no_numbers
 from driftwalk.motion.values import known_values
-from driftwalk.motion.worlds import no_numbers
 from driftwalk.schema import body_track
 from driftwalk.schema.check import build_dataset
 from driftwalk.simulation.backend import STATUS, check_sample_time

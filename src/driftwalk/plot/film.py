@@ -15,7 +15,7 @@ from driftwalk.core.files.atomic import atomic_path, require_target
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, draw_scale_bar
 from driftwalk.plot.parts.film_file import FRAMES_PER_S, Frame, require_film_writer, write_frames
-from driftwalk.plot.parts.poles import empty_bars, pole_bars, poles_of
+from driftwalk.plot.parts.polyomino_sketch import empty_bars, pole_bars, poles_of
 from driftwalk.plot.parts.style import PALETTE
 from driftwalk.schema.check import kind_name
 

@@ -123,7 +123,7 @@ class ControlTestWork:
     @property
     def study(self) -> Study:
         """The study of the policy."""
-        from driftwalk.assembly.control.stored import stored_modes
+        from driftwalk.assembly.control.plan import stored_modes
 
         return stored_modes(self.policy).study
 
@@ -134,7 +134,7 @@ class ControlTestWork:
 
     def checked(self) -> Self:
         """Refuse what is no policy."""
-        from driftwalk.assembly.control.stored import stored_rules
+        from driftwalk.assembly.control.plan import stored_rules
         from driftwalk.assembly.control.trial import trial_setting
 
         stored_rules(self.policy)

@@ -44,7 +44,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.typed_faces import FaceTable
+from driftwalk.assembly.lattice.joined_faces import FaceTable
 from driftwalk.assembly.pull.tables import BlockPull, block_pull
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import wall_edges

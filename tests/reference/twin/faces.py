@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from driftwalk.assembly.lattice.typed_faces import FaceTable
+from driftwalk.assembly.lattice.joined_faces import FaceTable
 from twin.body import NEIGHBOURS, Assembly, Ints
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import beta
 
 from driftwalk.assembly.control.controller import UNKNOWN, Controller, Rules
-from driftwalk.assembly.control.improvement import (
+from driftwalk.assembly.control.plan import (
     IMPROVEMENT_POLICY,
     Cells,
     cells_like,

@@ -19,10 +19,10 @@ from driftwalk.assembly import (
     outcome_distribution,
     sort_classes,
 )
-from driftwalk.assembly.outcomes.disc_contacts import CONTACT_POLICY, disc_class
+from driftwalk.assembly.outcomes.class_names import CONTACT_POLICY, disc_class
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.polyomino_sketch import class_cells, disc_places
-from driftwalk.schema.contact_graphs import contacts_of
+from driftwalk.schema.shapes import contacts_of
 
 DIAMETER = 0.04
 

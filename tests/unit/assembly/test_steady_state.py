@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.stats import chi2
 
 from driftwalk.assembly import rate_interval, steady_state
-from driftwalk.assembly.outcomes.event_rates import clustering
+from driftwalk.assembly.outcomes.steady_state import clustering
 from driftwalk.core.errors import InputError
 
 BREAK, LATCH = 0.5, 0.2

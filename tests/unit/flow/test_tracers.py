@@ -15,8 +15,8 @@ from hypothesis import given, settings, strategies as st
 from scipy.stats import binom, t as student
 
 from driftwalk.core.errors import InputError
-from driftwalk.flow import extract_flow, false_links, flow_from_tracers, load_flow, save_flow
-from driftwalk.flow.false_links import LINKS, judge_steps
+from driftwalk.flow import extract_flow, flow_from_tracers, load_flow, save_flow, tracers
+from driftwalk.flow.tracers import LINKS, judge_steps
 from driftwalk.flow.track_steps import Steps, step_noise, track_steps
 from driftwalk.schema import FLAGS, build_trajectory
 
@@ -101,7 +101,7 @@ def test_the_neighbours_of_a_step_are_looked_up_once(monkeypatch: pytest.MonkeyP
             return super().query(x, k)
 
     monkeypatch.setattr(scipy.spatial, "cKDTree", Counting)
-    monkeypatch.setattr(false_links, "_CHUNK", 100)
+    monkeypatch.setattr(tracers, "_CHUNK", 100)
     number, at = np.arange(450), np.random.default_rng(2).uniform(size=(450, 2))
     judge_steps(Steps(number, 2 * number, 0.0 * number, 1.0 + 0.0 * number, at, at), noise=0.0)
     assert looked_up == [100, 100, 100, 100, 50]

@@ -7,10 +7,10 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.likelihood.filter.filter_pass import Sums
-from driftwalk.likelihood.filter.forgetting import pull_of_prior, remembered
 from driftwalk.likelihood.filter.parameters import DRAG_SHAPES
 from driftwalk.likelihood.law.force_law import assumptions_of
 from driftwalk.likelihood.refuse import cholesky
+from driftwalk.likelihood.reml import pull_of_prior, remembered
 
 
 @pytest.mark.parametrize("crossing", [0.2, 1.0, 2.0, 20.0])

@@ -12,7 +12,7 @@ from recovery_worlds import TRUTH, synthetic_recovery
 from synthetic_calibration import bundled_recording
 
 from driftwalk.likelihood.check.criteria import MISFITS
-from driftwalk.page.chapters import in_chapters
+from driftwalk.page.run_page import in_chapters
 from driftwalk.page.sections.check import LOOKS_FOR
 from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.recovery import recovery_sections

@@ -3,7 +3,7 @@ from itertools import combinations, permutations
 import numpy as np
 import pytest
 
-from driftwalk.schema.contact_graphs import contacts_of, discs_of, graph_name
+from driftwalk.schema.shapes import contacts_of, discs_of, graph_name
 
 Contacts = tuple[tuple[int, int], ...]
 # Connected graphs up to isomorphism, https://oeis.org/A001349.

@@ -20,8 +20,7 @@ from driftwalk.assembly.lattice.polyomino import polyomino_name
 from driftwalk.datasets import tank30_flow
 from driftwalk.model import Study
 from driftwalk.schema import build_trajectory
-from driftwalk.track.observer import AssemblyObserver, observe
-from driftwalk.track.possible_classes import possible_classes
+from driftwalk.track.observer import AssemblyObserver, observe, possible_classes
 
 RUNS, DURATION = 5, 30.0
 

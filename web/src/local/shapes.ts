@@ -22,7 +22,7 @@ type Contact = readonly [one: number, other: number];
 
 const NAMES = Object.keys(SHAPES);
 const known = new Map<string, string>();
-/** As in src/driftwalk/schema/contact_graphs.py. */
+/** As in src/driftwalk/schema/shapes.py. */
 const GRAPHS = new Map([
   ["ab.ac.bc", "triangle"],
   ["ab.ac.ad.bc", "paw"],

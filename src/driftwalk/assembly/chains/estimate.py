@@ -32,7 +32,7 @@ from driftwalk.assembly.chains.mixing import (
 )
 from driftwalk.assembly.chains.predicted import passage, shares
 from driftwalk.assembly.outcomes.class_names import sort_classes
-from driftwalk.assembly.outcomes.event_rates import PARTS, clustering, rate_interval
+from driftwalk.assembly.outcomes.steady_state import PARTS, clustering, rate_interval
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.answers.facts import texts

@@ -8,8 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.assembly.control.plan import CONTROL_POLICY
-from driftwalk.assembly.control.stored import stored_modes, stored_rules, stored_wanted
+from driftwalk.assembly.control.plan import (
+    CONTROL_POLICY,
+    stored_modes,
+    stored_rules,
+    stored_wanted,
+)
 from driftwalk.assembly.control.worlds import Setting, Worlds
 from driftwalk.assembly.runs.dataset import build_path
 from driftwalk.assembly.runs.plan import make_plan

@@ -12,22 +12,24 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.bonds import (
+from driftwalk.assembly.lattice.joined_faces import FaceTable
+from driftwalk.assembly.lattice.many_blocks import DiscWorld, SquareWorld, replay_many
+from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
+from driftwalk.assembly.lattice.rigid_joins import (
     CLOSING,
     JOINING,
     OPENING,
     PARTING,
     BondGraph,
 )
-from driftwalk.assembly.lattice.many_blocks import DiscWorld, SquareWorld, replay_many
-from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
-from driftwalk.assembly.lattice.typed_faces import FaceTable
 from driftwalk.assembly.outcomes.class_names import (
     class_name,
+    contact_pairs,
+    disc_shape,
     listed_classes,
     listed_shapes,
+    touching,
 )
-from driftwalk.assembly.outcomes.disc_contacts import contact_pairs, disc_shape, touching
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import MOST_NAMED, all_single, moved_to_origin
@@ -149,7 +151,7 @@ def replay_contacts(
     pose : ndarray, shape (runs, blocks, 2 or more)
         Columns x and y at the end [m]; of rectangles the third is theta [rad].
     diameter, width
-        As in `driftwalk.assembly.outcomes.disc_contacts.touching`.
+        As in `driftwalk.assembly.outcomes.components.touching`.
 
     Raises
     ------

@@ -13,15 +13,17 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.bonds import CLOSING, JOINING, OPENING, PARTING
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, shape_order
+from driftwalk.assembly.lattice.rigid_joins import CLOSING, JOINING, OPENING, PARTING
 from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.contact_graphs import MOST_DISCS, counted_graph, graph_name
 from driftwalk.schema.shapes import (
     MOST_CELLS_NAMED,
+    MOST_DISCS,
     counted_class,
+    counted_graph,
     counted_shape,
+    graph_name,
     moved_to_origin,
 )
 

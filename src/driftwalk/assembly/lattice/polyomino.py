@@ -17,13 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.schema.contact_graphs import discs_of, graph_order
 from driftwalk.schema.shapes import (
     NAMED_SHAPES,
     Cell,
     Cells,
     cells_of_shape,
     counts_of_shape,
+    discs_of,
+    graph_order,
     moved_to_origin,
 )
 

@@ -2,14 +2,27 @@
 
 A class is the multiset of the shapes, written with the larger ones first: ``I3+1`` is a row of
 three and a single block. Classes are listed by the sizes of their shapes, the largest first, and
-then by the shapes. Of discs a shape is a contact graph (`driftwalk.schema.contact_graphs`).
+then by the shapes. The names of shapes and of contact graphs are those of
+`driftwalk.schema.shapes`.
+
+**Kinds of blocks** make coloured polyominoes. A shape is written with the kinds of its blocks, row
+by row from the top as the shape is drawn: ``T:ABAA`` has the bar A B A and an A below. Of the ways
+to lay the shape on its drawing the one with the kinds first in the alphabet counts. Faces do not
+count, only kinds.
+
+**Discs and rectangles** latch as they lie, so the shape of an assembly is its contact graph: which
+of its bodies touch, however they are numbered. Assemblies are rigid: the poses at the end say what
+touched all along.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import combinations_with_replacement, groupby, product
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +30,8 @@ import numpy.typing as npt
 from driftwalk.assembly.lattice.polyomino import (
     Chirality,
     merged_shape,
+    name_of,
+    orientations,
     polyomino_cells,
     polyomino_name,
     polyominoes,
@@ -24,9 +39,22 @@ from driftwalk.assembly.lattice.polyomino import (
     shape_order,
     shape_size,
 )
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
-from driftwalk.schema.contact_graphs import discs_of
-from driftwalk.schema.shapes import MOST_NAMED, counted_assemblies, counted_class
+from driftwalk.schema.check import require_kind
+from driftwalk.schema.shapes import (
+    MOST_NAMED,
+    Cell,
+    counted_assemblies,
+    counted_class,
+    discs_of,
+    graph_name,
+    moved_to_origin,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 MOST_BLOCKS = 8
 """Blocks up to which all classes are listed; of more, those that occur. Chosen by hand."""
@@ -315,3 +343,195 @@ def _partitions(total: int, largest: int) -> Iterator[tuple[int, ...]]:
     for first in range(min(total, largest), 0, -1):
         for rest in _partitions(total - first, first):
             yield (first, *rest)
+
+
+def kind_classes(assembly: xr.Dataset) -> dict[str, int]:
+    """Count the runs by outcome class with the kinds of the blocks, the most frequent first.
+
+    Parameters
+    ----------
+    assembly : xarray.Dataset
+        An `assembly` of blocks of several kinds, ``[assembly] binding`` of its study.
+
+    Returns
+    -------
+    dict of str to int
+        Number of runs by class, such as ``"2:AB+1:A+1:B"``; names of several letters are parted by
+        commas. Runs without an outcome are left out.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind, or its blocks are all of one.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> kinds = [{"name": n, "count": 1, "faces": ["N", "S", "N", "S"]} for n in "AB"]
+    >>> study = dw.Study(assembly={"blocks": 2, "binding": {"kinds": kinds}})
+    >>> found = dw.assembly.assemble(study, dw.uniform_flow(0.0, 0.0), runs=3, duration=0.1)
+    >>> dw.assembly.kind_classes(found)
+    {'1:A+1:B': 3}
+    """
+    from driftwalk.model import parse_study
+
+    require_kind(assembly, "assembly")
+    if "kind" not in assembly:
+        raise InputError(
+            "the blocks are all of one kind: outcome_distribution counts their classes"
+        )
+    settings = parse_study(assembly.attrs["study"]).assembly
+    names = [kind.name for kind in settings.binding.kinds] if settings.binding is not None else []
+    whole = (assembly[name].values for name in ("outcome", "cell", "kind", "assembly"))
+    found = Counter[str]()
+    for outcome, cell, kind, label in zip(*whole, strict=True):
+        if outcome < 0:
+            continue
+        shapes = []
+        for one in np.unique(label):
+            own = label == one
+            cells = tuple(map(tuple, cell[own].tolist()))
+            kinds = tuple(names[place] for place in kind[own])
+            shapes.append(_coloured(cells, kinds, settings.chirality))
+        found["+".join(sorted(shapes, key=_order))] += 1
+    return dict(found.most_common())
+
+
+@lru_cache(maxsize=1 << 16)
+def _coloured(cells: tuple[Cell, ...], kinds: tuple[str, ...], chirality: Chirality) -> str:
+    name = name_of(moved_to_origin(cells), chirality)
+    drawn = sorted(map(tuple, polyomino_cells(name).tolist()))
+    ways = []
+    for turned in orientations(cells, chirality):
+        low = min(x for x, _ in turned), min(y for _, y in turned)
+        placed = {
+            (x - low[0], y - low[1]): kind for (x, y), kind in zip(turned, kinds, strict=True)
+        }
+        if sorted(placed) == drawn:
+            ways.append([placed[at] for at in sorted(placed, key=lambda at: (-at[1], at[0]))])
+    parted = "," if any(len(kind) > 1 for kind in kinds) else ""
+    return f"{name}:{parted.join(min(ways))}"
+
+
+def _order(shape: str) -> tuple[int, tuple[int, int, str, str], str]:
+    name, _, kinds = shape.partition(":")
+    return -shape_size(name), shape_order(name), kinds
+
+
+class ContactPolicy(NamedTuple):
+    """When discs, or rectangles, of one assembly touch."""
+
+    gap: float = 0.01
+    """Gap up to which two bodies of an assembly are a contact, in diameters or longer sides; chosen
+    by hand: two discs close it within a time step. The native core has the same for what a removed
+    one leaves."""
+
+
+CONTACT_POLICY: Final = ContactPolicy()
+
+
+def overlap_depth(
+    first: Floats, second: Floats, *, side: float, width: float | None = None
+) -> Floats:
+    """Return how deep rectangles overlap [m], negative where they are apart, shape (n,).
+
+    By the separating axes (Gottschalk, Lin and Manocha 1996): the smallest over the four face
+    directions.
+
+    Parameters
+    ----------
+    first, second : ndarray, shape (n, 3)
+        Poses [m, m, rad].
+    side : float
+        Length along the own x [m].
+    width : float, optional
+        Along the own y [m]; default: squares.
+    """
+    turn = second[:, 2] - first[:, 2]
+    half = np.array([side, side if width is None else width]) / 2.0
+    same, turned = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    reach = half[:, None] * (1.0 + same) + half[::-1, None] * turned
+    along = np.stack([first[:, 2], first[:, 2], second[:, 2], second[:, 2]])
+    along += np.array([0.0, 0.5, 0.0, 0.5])[:, None] * np.pi
+    apart = second[:, :2] - first[:, :2]
+    reached = np.abs(np.cos(along) * apart[:, 0] + np.sin(along) * apart[:, 1])
+    return np.asarray((np.tile(reach, (2, 1)) - reached).min(axis=0))
+
+
+def touching(places: Floats, *, diameter: float, width: float | None = None) -> Bools:
+    """Return which bodies touch, if they are of one assembly, shape (n, n); each touches itself.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n, 2 or more)
+        Columns x and y of the centres [m]; of rectangles the third is theta [rad].
+    diameter : float
+        Of a disc, or length of a rectangle along its own x [m].
+    width : float, optional
+        Of a rectangle, along its own y [m]; default: discs.
+    """
+    if width is None:
+        x, y = places[:, 0], places[:, 1]
+        apart = np.hypot(x[:, None] - x, y[:, None] - y)
+        return np.asarray(apart <= diameter * (1.0 + CONTACT_POLICY.gap))
+    first, second = (index.ravel() for index in np.indices((len(places), len(places))))
+    depth = overlap_depth(places[first], places[second], side=diameter, width=width)
+    gap = CONTACT_POLICY.gap * max(diameter, width)
+    return np.asarray(depth >= -gap).reshape(len(places), -1)
+
+
+def contact_pairs(
+    places: Floats, *, diameter: float, width: float | None = None
+) -> list[tuple[int, int]]:
+    """Return the pairs that touch, of many bodies; parameters as in `touching`."""
+    from scipy.spatial import cKDTree
+
+    gap = CONTACT_POLICY.gap
+    if width is None:
+        return sorted(cKDTree(places[:, :2]).query_pairs(diameter * (1.0 + gap)))
+    reach = math.hypot(diameter, width) + math.sqrt(2.0) * gap * max(diameter, width)
+    pairs = cKDTree(places[:, :2]).query_pairs(reach, output_type="ndarray")
+    depth = overlap_depth(places[pairs[:, 0]], places[pairs[:, 1]], side=diameter, width=width)
+    return [(a, b) for a, b in pairs[depth >= -gap * max(diameter, width)].tolist()]
+
+
+def disc_shape(touch: Bools, *, noun: str = "discs") -> str:
+    """Return the name of an assembly from which of its bodies touch, shape (n, n)."""
+    contacts = [(a, b) for a, b in np.argwhere(np.triu(touch, 1)).tolist()]
+    return graph_name(len(touch), contacts, noun)
+
+
+def disc_class(
+    places: Floats,
+    assembly: Sequence[int] | npt.NDArray[np.int32],
+    *,
+    diameter: float,
+    width: float | None = None,
+) -> str:
+    """Name the outcome class of a world of discs, or of rectangles.
+
+    Parameters
+    ----------
+    places, diameter, width
+        As in `touching`.
+    assembly : sequence of int, shape (n,)
+        Which assembly each body belongs to: any label.
+
+    Returns
+    -------
+    str
+        Names of the contact graphs (`driftwalk.schema.shapes`), joined by ``+``.
+
+    Examples
+    --------
+    >>> row = np.array([[0.0, 0.0], [0.04, 0.0], [0.08, 0.0], [0.2, 0.0]])
+    >>> disc_class(row, [0, 0, 0, 3], diameter=0.04)
+    'chain3+1'
+    """
+    labels = np.asarray(assembly)
+    if labels.size > MOST_NAMED:
+        return counted_class(np.unique(labels).size)
+    touch = touching(places, diameter=diameter, width=width)
+    members = [np.flatnonzero(labels == label) for label in np.unique(labels)]
+    noun = "discs" if width is None else "rectangles"
+    return class_name(disc_shape(touch[np.ix_(own, own)], noun=noun) for own in members)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.bonds import JOINING, PARTING
 from driftwalk.assembly.lattice.polyomino import shape_size
+from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
 from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
 from driftwalk.assembly.outcomes.distribution import (
     NOT_COPIED,
@@ -24,8 +24,7 @@ from driftwalk.assembly.outcomes.survival import checked_times
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.intervals import check_confidence
 from driftwalk.schema.check import build_dataset
-from driftwalk.schema.contact_graphs import discs_of
-from driftwalk.schema.shapes import cells_of_shape, counts_of_shape
+from driftwalk.schema.shapes import cells_of_shape, counts_of_shape, discs_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.bonds import JOINING, PARTING
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_contacts, replay_events
-from driftwalk.assembly.lattice.typed_faces import face_table
-from driftwalk.assembly.runs.bonds import bond_attrs
-from driftwalk.assembly.runs.glued import glued_cells
+from driftwalk.assembly.lattice.joined_faces import face_table
+from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
+from driftwalk.assembly.runs.bonds import bond_attrs, glued_cells
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays

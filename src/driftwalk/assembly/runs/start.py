@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.outcomes.disc_contacts import overlap_depth
-from driftwalk.assembly.runs.glued import glued_cells
+from driftwalk.assembly.outcomes.class_names import overlap_depth
+from driftwalk.assembly.runs.bonds import glued_cells
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.schema import FLAGS, check_flow_field

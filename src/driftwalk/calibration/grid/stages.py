@@ -41,8 +41,8 @@ from driftwalk.calibration.warnings import (
 )
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows
+from driftwalk.motion.protocol import no_numbers
 from driftwalk.motion.score import broken_worlds
-from driftwalk.motion.worlds import no_numbers
 from driftwalk.schema.answers.verdict import Verdict, verdict_of
 
 

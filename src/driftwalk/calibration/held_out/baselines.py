@@ -12,7 +12,7 @@ from driftwalk.calibration.held_out.hidden_markov import HiddenMarkovModel
 from driftwalk.comparison.aspects import Aspect
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.motion import Worlds
-from driftwalk.motion.worlds import WorldRandom
+from driftwalk.motion.protocol import WorldRandom
 
 if TYPE_CHECKING:
     from driftwalk.conditions import Conditions

@@ -13,8 +13,8 @@ from driftwalk.comparison.aspects import AspectReference
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import Progress
+from driftwalk.motion.protocol import no_numbers
 from driftwalk.motion.score import broken_worlds
-from driftwalk.motion.worlds import no_numbers
 from driftwalk.schema.answers.facts import AnswerParts, texts
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
 

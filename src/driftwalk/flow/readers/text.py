@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.flow.grid import FieldRows
 from driftwalk.flow.readers.columns import (
     FIELD,
     choose_columns,
@@ -23,7 +24,6 @@ from driftwalk.flow.readers.columns import (
 )
 from driftwalk.flow.readers.programs import HEAD, PLAIN, Program, program_of
 from driftwalk.flow.readers.units import RawField
-from driftwalk.flow.rows import FieldRows
 
 Array = npt.NDArray[np.float64]
 Lines = list[tuple[int, str]]

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.units import parse_quantity
-from driftwalk.flow.rows import FieldRows
+from driftwalk.flow.grid import FieldRows
 
 
 @dataclass(frozen=True)

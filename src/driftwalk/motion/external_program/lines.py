@@ -15,7 +15,7 @@ from driftwalk.core.errors import ConfigurationError, FormatError, did_you_mean
 from driftwalk.core.files.bounded import MIB
 from driftwalk.core.text.json_text import json_value, parse_json
 from driftwalk.motion.external_program.process import ProgramFault, Request
-from driftwalk.motion.worlds import in_words, world_seeds, world_starts
+from driftwalk.motion.protocol import in_words, world_seeds, world_starts
 from driftwalk.schema import Parameter
 
 if TYPE_CHECKING:

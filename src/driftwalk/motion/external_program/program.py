@@ -39,9 +39,8 @@ from driftwalk.motion.external_program.process import (
     Request,
     close_programs,
 )
-from driftwalk.motion.protocol import Values, Worlds
+from driftwalk.motion.protocol import Values, Worlds, in_words, world_batches
 from driftwalk.motion.ranges import Given, with_given
-from driftwalk.motion.worlds import in_words, world_batches
 
 if TYPE_CHECKING:
     import xarray as xr

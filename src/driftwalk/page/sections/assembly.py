@@ -1,4 +1,7 @@
-"""A page on self-assembly: what the blocks built, how surely, when, and sample runs."""
+"""A page on self-assembly: what the blocks built, how surely, when, and sample runs.
+
+Where bonds break: shares of time, rates and lifetimes of the classes.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ from driftwalk.page.parts import (
     quantity,
     require,
     required,
+    section_of_table,
     sections_of,
     series,
     summary_section,
@@ -30,14 +34,15 @@ from driftwalk.page.sections.outcomes import (
     size_sections,
 )
 from driftwalk.page.sections.replay import replay_section
-from driftwalk.page.sections.steady_state import steady_sections
 from driftwalk.plot.parts.assembly_labels import class_names
-from driftwalk.schema.answers.assembly import attraction_words
+from driftwalk.schema.answers.assembly import attraction_words, steady_parts, steady_words
+from driftwalk.schema.answers.parts import Table
 from driftwalk.schema.kinds.sensitivity import axis_number
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 FOUND, DRAWN = "parameters found", "parameters drawn"
 SURVIVAL: Final = {
@@ -296,3 +301,44 @@ def _left_out(found: dict[str, xr.Dataset]) -> list[str]:
         for name, one in found.items()
         if one.attrs.get("left_out")
     ]
+
+
+MOST_CURVES = 8
+"""Classes whose lifetimes are drawn, those with the most time."""
+
+
+def steady_sections(steady: xr.Dataset) -> list[Section]:
+    """Return the table of the classes, and the survival of those with the most time.
+
+    Parameters
+    ----------
+    steady : xarray.Dataset
+        A `steady_state`.
+
+    Raises
+    ------
+    InputError
+        When it has no shares or no survival.
+    """
+    require(steady, "class", "time_share", "age", "survival", "class_time")
+    table = next(part for part in steady_parts(steady) if isinstance(part, Table))
+    note = f"{table.title[0].upper()}{table.title[1:]}. {steady_words(steady).capitalize()}."
+    time = np.where(
+        np.isfinite(steady["survival"].values).any(axis=0), steady["class_time"].values, 0.0
+    )
+    drawn = []
+    for place in np.argsort(-time, kind="stable")[:MOST_CURVES].tolist():
+        if time[place] > 0:
+            one = steady.isel({"class": place})
+            ends = (one["survival_low"].values, one["survival_high"].values)
+            name = short_class(str(one["class"].values))
+            drawn.append(series(name, steady["age"].values, one["survival"].values, ends=ends))
+    return [
+        section_of_table("steady-state", "Steady state", table, note),
+        chart(
+            "lifetimes", "Lifetimes of the classes",
+            "Kaplan-Meier, censored at the end of a run; a stay ends with a joining or a parting.",
+            x=label("time since the class formed", "s"), y=label("share that lasts longer"),
+            series=drawn, marks=[mark("half of the stays", y=0.5)],
+        ),
+    ]  # fmt: skip

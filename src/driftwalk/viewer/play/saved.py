@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.typed_faces import face_table
-from driftwalk.assembly.outcomes.disc_contacts import CONTACT_POLICY
+from driftwalk.assembly.lattice.joined_faces import face_table
+from driftwalk.assembly.outcomes.class_names import CONTACT_POLICY
 from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.plan import Plan, make_plan, whole_steps
 from driftwalk.comparison.significance import steps_memory_time, usual_block_length

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.assembly import outcome_distribution, world_class
-from driftwalk.assembly.outcomes.disc_contacts import disc_class
+from driftwalk.assembly.outcomes.class_names import disc_class
 from driftwalk.page.parts import section
 from driftwalk.page.sections.outcomes import class_items
 from driftwalk.plot.parts.assembly_labels import class_names
