@@ -1,6 +1,6 @@
 """Bonds that break, and blocks that start glued together: joined at time 0, permanently.
 
-What of bonds is refused, and how many events a run may have.
+Some bonds are refused, and the number of events of a run is limited.
 """
 
 from __future__ import annotations
