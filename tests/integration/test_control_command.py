@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import FLOW, here
-from driftwalk.page.chapters import in_chapters
 from every_kind import every_kind
 from made_up_fit import made_up_fit
 from small_sensitivity import FLOW as STREAM, small
@@ -23,6 +22,7 @@ from driftwalk.assembly.control.controller import Rules
 from driftwalk.assembly.control.plan import stored_modes, stored_rules
 from driftwalk.assembly.control.worlds import Setting, Worlds
 from driftwalk.core.intervals import difference_interval
+from driftwalk.page.run_page import in_chapters
 from driftwalk.page.sections.control import trial_sections
 from driftwalk.runs import ControlPlanWork
 from driftwalk.schema.answers.parts import lines_of
