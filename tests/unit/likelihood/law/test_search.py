@@ -20,6 +20,7 @@ from driftwalk.figures import laws_figures, write_figures
 from driftwalk.likelihood import compare_laws
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interval_inflation import _log_drag_std
+from driftwalk.likelihood.law import search
 from driftwalk.likelihood.law.force_law import assumptions_of
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.held_out import LAWS
@@ -66,12 +67,20 @@ def test_the_power_of_the_drag_is_found() -> None:
 
 
 @pytest.mark.slow
-def test_a_slight_power_of_the_drag_widens_the_interval() -> None:
+def test_a_slight_power_of_the_drag_widens_the_interval(monkeypatch: pytest.MonkeyPatch) -> None:
     """The power is 2.12, below the least effect of 0.15; the paper's law alone misses C_d."""
-    fit = dw.fit_motion(driven(7, 600.0, {"forces.drag_power": 2.12}), coarse_study("auto"))
+    motion = driven(7, 600.0, {"forces.drag_power": 2.12})
+    fit = dw.fit_motion(motion, coarse_study("auto"))
     assert not fit["number_opened"].values.any()
     assert within(fit, "drag_coefficient", 0.45)
     assert [text for text in map(str, fit["warning"].values) if SLIGHT in text]
+    assert not fit.attrs.get("law_unsettled")
+    # Where the power changes C_d by more than a tenth the law is not settled.
+    monkeypatch.setattr(search, "LAW", search.LAW._replace(slight_drag=0.01))
+    unsettled = dw.fit_motion(motion, coarse_study("auto"))
+    assert str(unsettled.attrs["law_unsettled"]).startswith(SLIGHT)
+    assert "; with it C_d is 8 % larger: state" in unsettled.attrs["law_unsettled"]
+    assert unsettled["interval"].equals(fit["interval"])
 
 
 def test_the_interval_of_the_quadratic_part_knows_its_share() -> None:
