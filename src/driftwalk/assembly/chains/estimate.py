@@ -35,10 +35,12 @@ from driftwalk.assembly.outcomes.class_names import sort_classes
 from driftwalk.assembly.outcomes.steady_state import PARTS, clustering, rate_interval
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.shards import Arrays
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import is_one_assembly
-from driftwalk.sweep import WorkUnit, grid, run_sweep
+from driftwalk.sweep import Design, WorkUnit, grid, run_sweep
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -144,14 +146,18 @@ def kinetics(
     mixing = judge_mixing(found)
     folds, replicates = KINETICS_POLICY.folds, KINETICS_POLICY.replicates
     whole = len(FORMS) * folds + replicates
-    how: dict[str, Any] = {"executor": executor}
-    scored = run_sweep(
-        HeldOut(found),
-        grid(model=np.arange(len(FORMS)), fold=np.arange(folds)).units(1),
-        store=None if store is None else store("held_out"),
-        progress=None if progress is None else lambda done, _: progress(done, whole),
-        **how,
-    )
+
+    def swept(name: str, function: HeldOut | Replicate, design: Design, begun: int) -> Arrays:
+        return run_sweep(
+            function,
+            design.units(1),
+            store=None if store is None else store(name),
+            executor=executor,
+            progress=lambda done, _: (progress or tell_nobody)(begun + done, whole),
+        )
+
+    models = grid(model=np.arange(len(FORMS)), fold=np.arange(folds))
+    scored = swept("held_out", HeldOut(found), models, 0)
     scores = np.nansum(scored["score"].reshape(len(FORMS), folds, -1), axis=1)
     best = int(scores.mean(axis=1).argmax())
     behind = scores - scores[best]
@@ -159,15 +165,9 @@ def kinetics(
     chosen = int(np.flatnonzero(behind.mean(axis=1) >= -error)[0])
     model = fit(found, FORMS[chosen])
     pairs = np.argwhere(np.sum([counts_and_times(one)[0] for one in sets], axis=0) > 0)
-    bands = run_sweep(
-        Replicate(found, model, pairs, own_target, seed),
-        grid(replicate=np.arange(replicates)).units(1),
-        store=None if store is None else store("bootstrap"),
-        progress=None
-        if progress is None
-        else lambda done, _: progress(whole - replicates + done, whole),
-        **how,
-    )
+    again = Replicate(found, model, pairs, own_target, seed)
+    drawn = grid(replicate=np.arange(replicates))
+    bands = swept("bootstrap", again, drawn, whole - replicates)
     data, coords, attrs = _rates(sets, pairs, seed)
     data |= {
         "score": ("model", scores.mean(axis=1)),
@@ -473,18 +473,13 @@ def completion(found: Histories, model: Model) -> dict[str, Any]:
 
 def _other_blocks(found: Histories, verdict: str, blocks: int) -> dict[str, Any]:
     """Return the rate of the first joining of another number of blocks, or why there is none."""
-    if verdict != WELL_MIXED:
-        return {
-            "other_blocks": blocks,
-            "other_blocks_refused": f"no rate for {blocks} blocks is extrapolated: {verdict}",
-        }
     own = blocks_of(found.classes[0])
     apart = found.first & np.array([set(n.split("+")) == {"1"} for n in found.classes])[found.state]
-    if not apart.any():
+    if verdict != WELL_MIXED or not apart.any():
+        why = verdict if verdict != WELL_MIXED else "no run starts with single blocks"
         return {
             "other_blocks": blocks,
-            "other_blocks_refused": f"no rate for {blocks} blocks is extrapolated: no run starts "
-            "with single blocks",
+            "other_blocks_refused": f"no rate for {blocks} blocks is extrapolated: {why}",
         }
     joins, spent = (found.target[apart] >= 0).sum(), found.duration[apart].sum()
     pairs = blocks * (blocks - 1) / (own * (own - 1))

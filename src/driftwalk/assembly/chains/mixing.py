@@ -185,12 +185,6 @@ def needed_events(tests: int) -> int:
     return math.ceil(0.608 * (reach / math.log(MIXING_POLICY.shape * MIXING_POLICY.margin)) ** 2)
 
 
-def needed_runs(found: Histories, tests: int) -> int:
-    """Return the runs with which the class that is left most often has enough events."""
-    most = np.bincount(found.state[found.target >= 0], minlength=1).max()
-    return math.ceil(found.runs * needed_events(tests) / max(int(most), 1))
-
-
 def judge_mixing(found: Histories) -> Mixing:
     """Return whether rates alone describe the histories, with the numbers behind it."""
     tests = mixing_tests(found)
@@ -202,18 +196,20 @@ def judge_mixing(found: Histories) -> Mixing:
         f"90 %), {one.events} events, corrected p {p_text(corrected[k])}"
         for k, one in ((k, tests[k]) for k in refused)
     ]
+    most = int(np.bincount(found.state[found.target >= 0], minlength=1).max())
+    needed = needed_events(len(tests))
     if refused:
         named = {tests[k].against for k in refused}
         word = ", ".join(name for name in (NOT_EXPONENTIAL, MEMORY) if name in named)
-        return Mixing(word, reasons, tests, corrected)
-    most = int(np.bincount(found.state[found.target >= 0], minlength=1).max())
-    if most < needed_events(len(tests)):
-        runs = needed_runs(found, len(tests))
-        words_of = f"{found.runs} runs cannot tell a tank that is not well mixed: record {runs}"
-        return Mixing(CANNOT_TELL, [words_of], tests, corrected)
-    least = min((one.p for one in tests), default=1.0)
-    reasons = [f"none of {len(tests)} tests refuses it; the smallest p is {least:.2g}"]
-    return Mixing(WELL_MIXED, reasons, tests, corrected)
+    elif most < needed:
+        runs = math.ceil(found.runs * needed / max(most, 1))
+        word = CANNOT_TELL
+        reasons = [f"{found.runs} runs cannot tell a tank that is not well mixed: record {runs}"]
+    else:
+        least = min((one.p for one in tests), default=1.0)
+        word = WELL_MIXED
+        reasons = [f"none of {len(tests)} tests refuses it; the smallest p is {least:.2g}"]
+    return Mixing(word, reasons, tests, corrected)
 
 
 def equal_rates(

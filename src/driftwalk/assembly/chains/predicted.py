@@ -120,15 +120,14 @@ def passage(model: Model, target: int) -> Passage:
     equations = (1.0 + 1e-12) * np.eye(size * states) - matrix
     reach = np.clip(np.linalg.solve(equations, own.astype(np.float64)), 0.0, 1.0)
     time = np.where(own, 0.0, np.linalg.solve(equations, moments @ reach))
-    weight = _entered(model, jump).reshape(size, states)
+    weight = _entered(model, full[0])
     of = [(weight * one.reshape(size, states)).sum(axis=1) for one in (reach, time)]
     return Passage(of[0], np.where(of[0] > 1e-9, of[1] / np.maximum(of[0], 1e-9), np.nan))
 
 
-def _entered(model: Model, jump: Floats) -> Floats:
+def _entered(model: Model, whole: Floats) -> Floats:
     """Return the hidden states in which each class is entered, as shares, (class, hidden)."""
     size, states = model.start.shape
-    whole = np.einsum("ijz,jzy->izjy", jump, model.switch).reshape(size * states, -1)
     visits, now = np.zeros(size * states), model.start.ravel()
     for _ in range(4 * size):
         visits, now = visits + now, now @ whole
