@@ -21,9 +21,8 @@ import xarray as xr
 
 import driftwalk as dw
 from driftwalk.assembly.chains.estimate import empirical_shares
-from driftwalk.assembly.chains.hidden import FORMS, fit
+from driftwalk.assembly.chains.hidden import FORMS, STEPS, fit, shares
 from driftwalk.assembly.chains.histories import histories
-from driftwalk.assembly.chains.predicted import STEPS, shares
 
 SETTINGS = tuple(product((0.0, 0.5, 1.0, 1.5), (0.2, 0.55, 1.2)))
 TIMES = np.array([60.0, 120.0, 300.0])

@@ -21,7 +21,7 @@ from scipy.stats import qmc
 
 import driftwalk as dw
 from driftwalk.assembly.outcome_posterior.emulator import Emulator, log_likelihoods
-from driftwalk.assembly.outcome_posterior.nodes import Nodes
+from driftwalk.assembly.outcome_posterior.problem import Nodes
 from driftwalk.assembly.outcome_posterior.records import KINDS, Categories, Record
 from driftwalk.assembly.outcome_posterior.region import REGION_POLICY, covered, self_check
 from driftwalk.model import apply_overrides

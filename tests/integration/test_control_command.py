@@ -18,9 +18,8 @@ from small_sensitivity import FLOW as STREAM, small
 
 import driftwalk as dw
 from driftwalk.assembly import Modes, Wanted
-from driftwalk.assembly.control.controller import Rules
 from driftwalk.assembly.control.plan import stored_modes, stored_rules
-from driftwalk.assembly.control.worlds import Setting, Worlds
+from driftwalk.assembly.control.worlds import Rules, Setting, Worlds
 from driftwalk.core.intervals import difference_interval
 from driftwalk.page.run_page import in_chapters
 from driftwalk.page.sections.control import trial_sections

@@ -8,7 +8,7 @@ from chain_runs import CLASSES, chain_runs
 from scipy.stats import binom
 
 from driftwalk.assembly.chains.estimate import Replicate, empirical_shares
-from driftwalk.assembly.chains.hidden import FORMS, Form, fit
+from driftwalk.assembly.chains.hidden import FORMS, Form, fit, passage, shares
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.chains.mixing import (
     CANNOT_TELL,
@@ -16,7 +16,6 @@ from driftwalk.assembly.chains.mixing import (
     equal_rates,
     judge_mixing,
 )
-from driftwalk.assembly.chains.predicted import passage, shares
 from driftwalk.sweep import grid, run_sweep
 
 CHAINS = 400

@@ -16,10 +16,9 @@ from driftwalk.assembly.lattice.joined_faces import ROUNDING, face_table
 from driftwalk.assembly.lattice.rigid_joins import CLOSING, JOINING, PARTING, BondGraph
 from driftwalk.assembly.outcomes.class_names import disc_class
 from driftwalk.assembly.pull.tables import block_pull
-from driftwalk.assembly.runs.bonds import glued_cells, require_bonds
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
-from driftwalk.assembly.runs.start import require_room
+from driftwalk.assembly.runs.start import glued_cells, require_bonds, require_room
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import BROKEN

@@ -15,7 +15,6 @@ from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import ROUNDING
 from driftwalk.assembly.outcomes.class_names import disc_class
 from driftwalk.assembly.pull.tables import block_pull
-from driftwalk.assembly.runs.bonds import glued_cells
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import (
     MOST_STEPS,
@@ -25,7 +24,7 @@ from driftwalk.assembly.runs.plan import (
     start_poses,
     stream_keys,
 )
-from driftwalk.assembly.runs.start import require_room
+from driftwalk.assembly.runs.start import glued_cells, require_room
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import BROKEN

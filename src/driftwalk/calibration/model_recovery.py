@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 
-from driftwalk.calibration.estimation.result import parameter_parts
+from driftwalk.calibration.estimation.run import parameter_parts
 from driftwalk.calibration.recovery_study import (
     BrokenSimulation,
     EstimationMethod,

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import beta
 
-from driftwalk.assembly.control.controller import UNKNOWN, Controller, Rules
 from driftwalk.assembly.control.plan import (
     IMPROVEMENT_POLICY,
     Cells,
     cells_like,
     prior_of,
 )
+from driftwalk.assembly.control.worlds import UNKNOWN, Controller, Rules
 
 
 def flat(modes: int) -> Cells:

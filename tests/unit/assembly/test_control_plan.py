@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from driftwalk.assembly.control.controller import UNKNOWN, Controller, Rules
 from driftwalk.assembly.control.decision_process import (
     PROCESS_POLICY,
     Decisions,
@@ -15,6 +14,7 @@ from driftwalk.assembly.control.decision_process import (
     transitions,
     value_iteration,
 )
+from driftwalk.assembly.control.worlds import UNKNOWN, Controller, Rules
 
 BINS = len(PROCESS_POLICY.age_starts)
 

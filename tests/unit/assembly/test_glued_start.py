@@ -10,7 +10,7 @@ import pytest
 import driftwalk as dw
 from driftwalk.assembly import assemble, assembly_path
 from driftwalk.assembly.outcomes.distribution import class_at
-from driftwalk.assembly.runs.bonds import glued_cells
+from driftwalk.assembly.runs.start import glued_cells
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.model import Study
 from driftwalk.simulation import simulate

@@ -21,10 +21,17 @@ from driftwalk.assembly.chains.estimate import (
     empirical_shares,
     spread_of_known,
 )
-from driftwalk.assembly.chains.hidden import FORMS, Form, Model, fit, log_likelihood
+from driftwalk.assembly.chains.hidden import (
+    FORMS,
+    Form,
+    Model,
+    fit,
+    log_likelihood,
+    passage,
+    shares,
+)
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.chains.mixing import holm, mixing_tests, score
-from driftwalk.assembly.chains.predicted import passage, shares
 from driftwalk.core.errors import InputError
 from driftwalk.schema.answers.kinetics import kinetics_answer
 from driftwalk.schema.answers.parts import lines_of

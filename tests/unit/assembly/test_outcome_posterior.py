@@ -14,12 +14,10 @@ from scipy.stats import multinomial, norm
 import driftwalk as dw
 from driftwalk.assembly import check_outcomes, read_outcomes
 from driftwalk.assembly.chains.histories import histories
-from driftwalk.assembly.outcome_posterior.dataset import posterior_dataset
 from driftwalk.assembly.outcome_posterior.emulator import Emulator, log_likelihoods
-from driftwalk.assembly.outcome_posterior.infer import emulate
-from driftwalk.assembly.outcome_posterior.nodes import Nodes
+from driftwalk.assembly.outcome_posterior.infer import emulate, posterior_dataset
 from driftwalk.assembly.outcome_posterior.observed import observed_of
-from driftwalk.assembly.outcome_posterior.problem import Checked, Emulated
+from driftwalk.assembly.outcome_posterior.problem import Checked, Emulated, Nodes
 from driftwalk.assembly.outcome_posterior.records import (
     BOTH,
     CLASSES,

@@ -17,6 +17,8 @@ from driftwalk.assembly.chains.hidden import (
     counts_and_times,
     fit,
     log_likelihood,
+    passage,
+    shares,
 )
 from driftwalk.assembly.chains.histories import (
     Histories,
@@ -30,7 +32,6 @@ from driftwalk.assembly.chains.mixing import (
     judge_mixing,
     needed_events,
 )
-from driftwalk.assembly.chains.predicted import passage, shares
 from driftwalk.assembly.outcomes.class_names import sort_classes
 from driftwalk.assembly.outcomes.steady_state import PARTS, clustering, rate_interval
 from driftwalk.core.arrays import Floats, Integers

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.assembly.control.controller import UNKNOWN, Controller
 from driftwalk.assembly.control.plan import stored_modes, stored_rules, stored_wanted
-from driftwalk.assembly.control.worlds import ages
+from driftwalk.assembly.control.worlds import UNKNOWN, Controller, ages
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import is_one_assembly
 

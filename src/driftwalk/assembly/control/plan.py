@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from driftwalk.assembly.control.controller import Rules
 from driftwalk.assembly.control.decision_process import (
     PROCESS_POLICY,
     Decisions,
@@ -30,7 +29,7 @@ from driftwalk.assembly.control.decision_process import (
     value_iteration,
 )
 from driftwalk.assembly.control.modes import Modes
-from driftwalk.assembly.control.worlds import Setting, Worlds, decisions_of
+from driftwalk.assembly.control.worlds import Rules, Setting, Worlds, decisions_of
 from driftwalk.assembly.outcomes.class_names import outcome_classes, target_class
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError

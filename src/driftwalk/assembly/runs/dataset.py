@@ -16,7 +16,7 @@ import numpy.typing as npt
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_contacts, replay_events
 from driftwalk.assembly.lattice.joined_faces import face_table
 from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
-from driftwalk.assembly.runs.bonds import bond_attrs, glued_cells
+from driftwalk.assembly.runs.start import bond_attrs, glued_cells
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays

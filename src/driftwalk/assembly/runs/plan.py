@@ -13,8 +13,16 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.assembly.lattice.joined_faces import face_table
 from driftwalk.assembly.pull.tables import block_pull, table_of
-from driftwalk.assembly.runs.bonds import event_rows, glued_cells, require_bonds, with_glue_events
-from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
+from driftwalk.assembly.runs.start import (
+    event_rows,
+    given_start,
+    glued_cells,
+    place_blocks,
+    require_bonds,
+    require_cover,
+    require_room,
+    with_glue_events,
+)
 from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays

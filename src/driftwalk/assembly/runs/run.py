@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Final, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.runs.bonds import event_rows, with_event_rows
 from driftwalk.assembly.runs.dataset import LAW_NAMES, build_assembly, build_path
 from driftwalk.assembly.runs.draws import (
     RUNS_PER_FLOW,
@@ -23,6 +22,7 @@ from driftwalk.assembly.runs.draws import (
     has_standard_error,
 )
 from driftwalk.assembly.runs.plan import Backend, Plan, make_plan, simulate_rows, start_poses
+from driftwalk.assembly.runs.start import event_rows, with_event_rows
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays

@@ -1,38 +1,375 @@
-"""Which motion model explains a recording? All searched alike, and judged on what none has seen."""
+"""Which motion model explains a recording? All searched alike, and judged on what none has seen.
+
+A comparison has two stages: distances of all models, then summaries of the closest.
+
+Models are searched at the same time in threads of this process. The simulations and distances of
+one model leave Python now and then only, so two threads in one model keep 1.2 processors busy, and
+two models with one thread each 1.8.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import Executor
-from typing import TYPE_CHECKING, Final
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from threading import Lock
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+import numpy as np
 
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.held_out.candidates import (
     BLOCK,
+    Candidate,
     Chosen,
     made_models,
     prepare_candidates,
     resampling_baselines,
 )
-from driftwalk.calibration.held_out.recorded import body_motion
+from driftwalk.calibration.held_out.held_out_score import (
+    HeldOutScore,
+    held_out_differences,
+    score_candidate,
+)
+from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
 from driftwalk.calibration.problem import Stores, in_memory
-from driftwalk.calibration.ranking.comparison_stages import (
-    Finished,
-    Searches,
-    Stages,
-    Tell,
-    thread_pool,
+from driftwalk.calibration.ranking.model_evidence import (
+    Evidence,
+    estimate_evidence,
+    most_settings,
+    shortlist_models,
 )
 from driftwalk.calibration.ranking.result import build_comparison
 from driftwalk.conditions import study_in_arena
-from driftwalk.core.run_stages import tell_nobody
-from driftwalk.motion import MotionModel, ParticleModel
-from driftwalk.sweep import threads_of_unit
+from driftwalk.core.files.shards import Arrays
+from driftwalk.core.processors import CancelOnError, one_blas_thread
+from driftwalk.core.run_stages import Course, tell_nobody
+from driftwalk.motion import BlockModel, MotionModel, ParticleModel
+from driftwalk.sweep import MemoryStore, Store, WorkUnit, collect, grid, run_sweep, threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+
+
+def runs_in_threads(entry: Candidate) -> bool:
+    """Return whether several threads may simulate a model: nobody knows of a user's own."""
+    return entry.baseline or isinstance(entry.model, BlockModel | ParticleModel)
+
+
+def longest_first(places: Sequence[int], entries: Sequence[Candidate]) -> list[int]:
+    """Return places of models so that none is left over for one processor at the end.
+
+    The block takes more steps of time than the others, which take the longer the more they have to
+    search.
+    """
+    return sorted(
+        places,
+        key=lambda k: (not isinstance(entries[k].model, BlockModel), -len(entries[k].ranges)),
+    )
+
+
+def with_thread_share(entry: Candidate, count: int) -> Candidate:
+    """Return a model with its share of the threads, where so many are searched at a time."""
+    each = max(entry.like.threads // max(count, 1), 1)
+    return entry._replace(like=replace(entry.like, threads=each))
+
+
+@contextmanager
+def thread_pool(count: int) -> Iterator[ThreadPoolExecutor | None]:
+    """Give threads for several models; none where there is one processor.
+
+    Left by an error, also by Ctrl-C, they are not waited for.
+    """
+    if count < 2:
+        yield None
+        return
+    pool = ThreadPoolExecutor(count, thread_name_prefix="model")
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+class SearchProgress:
+    """How far several searches are.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the models.
+    costs : sequence of int
+        Settings that each simulates at most.
+    tell : callable
+        Called with the settings done, in all, and the models under way.
+
+    Attributes
+    ----------
+    cancellation : CancelOnError
+        The block that waits for the searches; they end with it.
+    """
+
+    def __init__(
+        self, names: Sequence[str], costs: Sequence[int], tell: Callable[[int, str], None]
+    ) -> None:
+        self._names, self._costs, self._tell = names, costs, tell
+        self._done = [0] * len(names)
+        self._under_way: set[int] = set()
+        self._lock = Lock()
+        self.cancellation = CancelOnError()
+
+    def finished(self, indices: Sequence[int]) -> None:
+        """Hear which models were searched before."""
+        for index in indices:
+            self._done[index] = self._costs[index]
+
+    def __call__(self, index: int, done: int) -> None:
+        """Hear how many settings of a model are done; all of them when it is finished."""
+        self.cancellation.raise_if_cancelled()
+        with self._lock:
+            self._done[index] = done
+            if done < self._costs[index]:
+                self._under_way.add(index)
+            else:
+                self._under_way.discard(index)
+            names = ", ".join(self._names[k] for k in sorted(self._under_way))
+            self._tell(sum(self._done), names or self._names[index])
+
+
+Tell = Callable[[int, int, str], None]
+Finished = Callable[[str, float, float, int], None]
+"""Hears of a model that was judged: its name, its score, the standard error of that, and how many
+models there are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Searches:
+    """The function of the sweep: one model, searched and judged wherever it is sent."""
+
+    entries: Sequence[Candidate]
+    motion: RecordedMotion
+    budget: Budget
+    within: Callable[[int, int], None] | None = None
+    """Called with the model and the settings done; with all of them when it is finished."""
+    linear_algebra: ClassVar[bool] = True
+    """Its results depend on numpy and scipy."""
+
+    def __call__(self, unit: WorkUnit) -> dict[str, np.ndarray]:
+        """Search and judge the model of a unit."""
+        index = unit.start
+
+        def say(done: int, _: int) -> None:
+            if self.within is not None:
+                self.within(index, done)
+
+        say(0, 0)
+        with one_blas_thread():
+            found = score_candidate(self.entries[index], self.motion, budget=self.budget, tell=say)
+        say(self.costs()[index], 0)
+        most = max(len(entry.ranges) for entry in self.entries)
+        return _packed(found, most, self.budget.starts + 1)
+
+    def costs(self) -> list[int]:
+        """Return the settings that each model's search simulates at most."""
+        numbers = [len(entry.ranges) for entry in self.entries]
+        return [self.budget.evaluations(one) if one else 0 for one in numbers]
+
+    def fingerprint(self) -> dict[str, Any]:
+        """Return what determines the numbers of all models, for the store of a run."""
+        return {
+            "models": [entry.model.describe() for entry in self.entries],
+            "ranges": [[one.describe() for one in entry.ranges] for entry in self.entries],
+            "seed": self.motion.seed,
+            "budget": vars(self.budget),
+            "aspects": list(self.motion.held.names),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Stages:
+    """The two stages, and how far they are together."""
+
+    work: Searches
+    replicates: int
+    """Recordings by which a discrepancy is judged; below 2 the second stage is left out."""
+    stores: Stores
+    executor: Executor | None
+    """Elsewhere."""
+    tell: Tell
+    pool: Executor | None = None
+    """Threads of this process, where there is no executor."""
+    finished: Finished = tell_nobody
+    """Hears of each model that was searched and judged."""
+
+    def held_out(self) -> list[HeldOutScore]:
+        """Judge every model, one work unit each."""
+        entries = self.work.entries
+        units = grid(model=np.arange(len(entries))).units(1)
+        retained = self.stores("models", self.work.fingerprint())
+        retained = MemoryStore() if retained is None else retained
+        searched = self._searched_here if self.executor is None else self._searched_elsewhere
+        arrays = searched(units, retained, self._each_once(units, retained))
+        return [
+            _unpacked({name: values[index] for name, values in arrays.items()}, entry)
+            for index, entry in enumerate(entries)
+        ]
+
+    def evidence(self, held_out: Sequence[HeldOutScore]) -> dict[int, Evidence]:
+        """Match the summaries with those that tie, and with others while none reproduces them.
+
+        A model that does is no answer before those with fewer numbers were asked. Where one does,
+        so is each walk of recorded steps that the distances do not reject: whether it passes all
+        tests is their power.
+        """
+        if self.replicates < 2:
+            return {}
+        shortlist = shortlist_models(self.work.entries, held_out)
+        found: dict[int, Evidence] = {}
+        for number, index in enumerate(shortlist.models):
+            numbers = [self.work.entries[k].numbers for k, one in found.items() if one.misfit.usual]
+            if number >= shortlist.tied and min(numbers, default=math.inf) <= (
+                self.work.entries[index].numbers
+            ):
+                continue
+            planned = max(shortlist.tied, 1)
+            found[index] = self._matched(len(found), index, held_out[index].point, planned)
+        walks = [
+            index
+            for index, entry in enumerate(self.work.entries)
+            if entry.baseline and not held_out_differences(held_out[index], self.work.motion)
+        ]
+        if any(one.misfit.usual for one in found.values()):
+            for index in walks:
+                found[index] = self._matched(len(found), index, np.empty(0), len(found) + 1)
+        return found
+
+    @cached_property
+    def course(self) -> Course:
+        """How far all stages are together."""
+        able = [one for one in self.work.entries if not one.baseline]
+        asks = self.replicates > 1
+        # Most searches are given up after a few rounds, or find their optimum soon.
+        usual = sorted(most_settings(len(one.ranges), self.replicates) // 4 for one in able)
+        # A setting takes three times as long as one of the first stage (5 minutes of the bundled
+        # recording): all blocks of time are simulated.
+        # Three models are usually matched.
+        summaries = 3.0 * sum(usual[-3:]) if asks else 0.0
+        parts = {"models": sum(self.work.costs()), "summaries": summaries}
+        return Course(self.tell, {**parts, "figures": 0.0})
+
+    def _each_once(self, units: Sequence[WorkUnit], retained: Store) -> Callable[[int, int], None]:
+        """Return what a sweep tells its progress, which hears of each finished model once."""
+        reported: set[int] = set()
+
+        def look(_done: int, _total: int) -> None:
+            missing = {unit.start for unit in retained.missing(units)}
+            for unit in units:
+                index = unit.start
+                if index in missing or index in reported:
+                    continue
+                reported.add(index)
+                entry = self.work.entries[index]
+                arrays = {name: values[0] for name, values in retained.read(unit).items()}
+                one = _unpacked(arrays, entry)
+                self.finished(entry.model.name, one.score, one.score_std, len(units))
+
+        return look
+
+    def _searched_here(
+        self, units: Sequence[WorkUnit], retained: Store, look: Callable[[int, int], None]
+    ) -> Arrays:
+        """Search a user's own models, one by one, then those of driftwalk at the same time.
+
+        A user's model may fail: that is said before the others take minutes.
+        """
+        entries = self.work.entries
+        together = SearchProgress(
+            [one.model.name for one in entries],
+            self.work.costs(),
+            lambda done, names: self.course.stage("models")(done, sum(self.work.costs()), names),
+        )
+        missing = [unit.start for unit in retained.missing(units)]
+        together.finished([unit.start for unit in units if unit.start not in missing])
+        threaded = (
+            [k for k in missing if runs_in_threads(entries[k])] if self.pool is not None else []
+        )
+        others = [k for k in missing if k not in threaded]
+        alone = replace(self.work, within=together)
+        shared = replace(alone, entries=[with_thread_share(one, len(threaded)) for one in entries])
+        with together.cancellation:
+            if others:
+                run_sweep(alone, [units[k] for k in others], store=retained, progress=look)
+            if threaded:
+                first = [units[k] for k in longest_first(threaded, entries)]
+                run_sweep(shared, first, store=retained, executor=self.pool, progress=look)
+        return collect(retained, units)
+
+    def _searched_elsewhere(
+        self, units: Sequence[WorkUnit], retained: Store, look: Callable[[int, int], None]
+    ) -> Arrays:
+        """Search models where an executor puts them: only whole ones are heard of."""
+
+        def finished(done: int, total: int) -> None:
+            self.course.stage("models")(done, total)
+            look(done, total)
+
+        return run_sweep(
+            self.work, units, store=retained, executor=self.executor, progress=finished
+        )
+
+    def _matched(self, number: int, index: int, answer: np.ndarray, planned: int) -> Evidence:
+        """Match the summaries with one model: units of 16 settings, the rest in this process.
+
+        So many models as `planned` are asked, or some more.
+        """
+        entry = self.work.entries[index]
+
+        def say(done: int, most: int) -> None:
+            # Most end at a quarter of the most, some there: the root gives half to either.
+            inside = math.sqrt(done / most)
+            self.course.stage("summaries")(
+                number + inside, planned, f"summaries of {entry.model.name}"
+            )
+
+        fingerprint = {
+            **self.work.fingerprint(), "asked": index, "answer": answer.tolist(),
+            "worlds": self.replicates,
+        }  # fmt: skip
+        return estimate_evidence(
+            entry,
+            self.work.motion,
+            answer,
+            executor=self.executor or (self.pool if runs_in_threads(entry) else None),
+            store=self.stores(f"summaries-{number}", fingerprint),
+            tell=say,
+        )
+
+
+def _packed(held_out: HeldOutScore, most: int, searches: int) -> dict[str, np.ndarray]:
+    """Return arrays of the same shapes for every model, with one entry each."""
+    point = np.full(most, np.nan)
+    point[: held_out.point.size] = held_out.point
+    optimum_scores = np.full(searches, np.nan)
+    optimum_scores[: held_out.optimum_scores.size] = held_out.optimum_scores
+    arrays = {**held_out._asdict(), "point": point, "optimum_scores": optimum_scores}
+    return {name: np.asarray(values)[None] for name, values in arrays.items()}
+
+
+def _unpacked(arrays: Mapping[str, np.ndarray], entry: Candidate) -> HeldOutScore:
+    optimum_scores = arrays["optimum_scores"]
+    found = {
+        **arrays,
+        "point": arrays["point"][: len(entry.ranges)],
+        "score": float(arrays["score"]),
+        "optimum_scores": optimum_scores[np.isfinite(optimum_scores)],
+        "evaluations": int(arrays["evaluations"]),
+    }
+    return HeldOutScore(**found)
+
 
 DEFAULT_MODELS: Final = (
     BLOCK, "inertial", "active+wall", "run_tumble+wall", "run_rest+wall", "burst_coast+wall",

@@ -12,13 +12,12 @@ from driftwalk.calibration.estimation.estimate import find_optima
 from driftwalk.calibration.estimation.gauss_newton import GAUSS_NEWTON, simulations_of
 from driftwalk.calibration.estimation.label_switching import label_order
 from driftwalk.calibration.estimation.regression_abc import REGRESSION
-from driftwalk.calibration.estimation.summary_objective import SummaryObjective
+from driftwalk.calibration.estimation.summaries import SummaryObjective
 from driftwalk.calibration.estimation.synthetic_likelihood import (
     SIMULATIONS,
     synthetic_likelihood_at,
 )
 from driftwalk.calibration.evolution import rounded
-from driftwalk.calibration.held_out.bouts import BoutDistance, bout_distances
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
     HELD_OUT_REPLICATES,
@@ -27,7 +26,7 @@ from driftwalk.calibration.held_out.held_out_score import (
     held_out_differences,
     score_setting,
 )
-from driftwalk.calibration.held_out.law_findings import MISFIT, Misfit
+from driftwalk.calibration.held_out.law_findings import MISFIT, BoutDistance, Misfit, bout_distances
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import ks_2samp, t
 
-from driftwalk.calibration.held_out.bouts import bout_distances, bout_sentences
+from driftwalk.calibration.held_out.law_findings import bout_distances, bout_sentences
 from driftwalk.comparison.aspects import plan_aspects
 
 STEPS = 6000

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from driftwalk.calibration.problem import in_memory
-from driftwalk.calibration.ranking import comparison_stages
-from driftwalk.calibration.ranking.comparison_stages import Stages
+from driftwalk.calibration.ranking import compare
+from driftwalk.calibration.ranking.compare import Stages
 from driftwalk.calibration.ranking.model_evidence import Evidence, Shortlist
 
 
@@ -34,8 +34,8 @@ def test_others_than_those_that_tie_are_asked_until_one_gives_the_summaries(
     def answer(entry: int, *_: Any, **__: Any) -> Evidence:
         return Evidence(100.0 if entry in giving else 500.0, 90.0, 140.0, 0.0)
 
-    monkeypatch.setattr(comparison_stages, "shortlist_models", lambda *_: Shortlist(order, tied))
-    monkeypatch.setattr(comparison_stages, "most_settings", lambda *_: 4)
+    monkeypatch.setattr(compare, "shortlist_models", lambda *_: Shortlist(order, tied))
+    monkeypatch.setattr(compare, "most_settings", lambda *_: 4)
     monkeypatch.setattr(Stages, "_matched", lambda _, number, index, point, before: answer(index))
     entries = [SimpleNamespace(ranges=("a",), baseline=False, numbers=k) for k in numbers]
     work: Any = SimpleNamespace(entries=entries, costs=lambda: [1] * 4)
@@ -56,9 +56,7 @@ def test_a_walk_that_the_distances_do_not_reject_is_asked_where_a_model_gives_th
     rejected: Any = {0: [], 1: [], 2: ["place near the wall"]}
     judged: Any = [SimpleNamespace(point=np.zeros(0), number=number) for number in range(3)]
     misfit = 100.0 if reproduced else 500.0
-    monkeypatch.setattr(comparison_stages, "shortlist_models", lambda *_: Shortlist((0,), 1))
-    monkeypatch.setattr(
-        comparison_stages, "held_out_differences", lambda one, _: rejected[one.number]
-    )
+    monkeypatch.setattr(compare, "shortlist_models", lambda *_: Shortlist((0,), 1))
+    monkeypatch.setattr(compare, "held_out_differences", lambda one, _: rejected[one.number])
     monkeypatch.setattr(Stages, "_matched", lambda *_: Evidence(misfit, 90.0, 140.0, 0.0))
     assert list(Stages(work, 20, in_memory, None, lambda *_: None).evidence(judged)) == wanted

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from driftwalk.calibration.held_out import law_findings
-from driftwalk.calibration.held_out.bouts import BoutDistance
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore
+from driftwalk.calibration.held_out.law_findings import BoutDistance
 from driftwalk.calibration.held_out.recorded import CHECKS
 from driftwalk.calibration.held_out.wall_clearance import Clearance
 from driftwalk.calibration.ranking.model_evidence import Evidence, rank_by_evidence
-from driftwalk.calibration.ranking.model_verdicts import answer_sentence, model_verdicts
+from driftwalk.calibration.ranking.result import answer_sentence, model_verdicts
 from driftwalk.motion import motion_model
 from driftwalk.schema.answers.verdict import CANNOT_TELL, DOES_NOT_EXPLAIN, EXPLAINS, Verdict
 

@@ -9,15 +9,16 @@ import pytest
 from self_propelled import moving
 
 import driftwalk as dw
-from driftwalk.calibration.estimation.summary_objective import (
+from driftwalk.calibration.estimation.summaries import (
     ALIKE,
     SummaryObjective,
+    plan_summaries,
+    summarise,
 )
 from driftwalk.calibration.evolution import AspectObjective, wall_distance
 from driftwalk.calibration.held_out.candidates import prepare_candidates
 from driftwalk.calibration.held_out.held_out_score import even_blocks
 from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
-from driftwalk.calibration.summaries import plan_summaries, summarise
 from driftwalk.comparison.aspects import block_of
 from driftwalk.motion.score import BROKEN
 from driftwalk.sweep import MemoryStore, Store

@@ -11,7 +11,12 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from plain_summaries import PlainMotion, plain_summaries
 
-from driftwalk.calibration.summaries import SummaryPlan, count_summaries, plan_summaries, summarise
+from driftwalk.calibration.estimation.summaries import (
+    SummaryPlan,
+    count_summaries,
+    plan_summaries,
+    summarise,
+)
 from driftwalk.comparison.aspects import plan_aspects
 
 RADIUS = 0.15
