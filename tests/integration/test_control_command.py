@@ -19,7 +19,7 @@ from small_sensitivity import FLOW as STREAM, small
 import driftwalk as dw
 from driftwalk.assembly import Modes, Wanted
 from driftwalk.assembly.control.plan import stored_modes, stored_rules
-from driftwalk.assembly.control.worlds import Rules, Setting, Worlds
+from driftwalk.assembly.control.worlds import Rules, Worlds
 from driftwalk.core.intervals import difference_interval
 from driftwalk.page.run_page import in_chapters
 from driftwalk.page.sections.control import trial_sections
@@ -106,7 +106,7 @@ def test_a_policy_is_that_of_its_modes_again() -> None:
 def test_worlds_do_not_depend_on_units_and_constant_ones_are_those_of_a_batch() -> None:
     classes = dw.assembly.outcome_classes(3)
     rules = Rules(np.zeros((1, 3, len(classes), 6), dtype=np.int64))
-    work = Worlds(modes(), classes, Setting(5.0, 3), rules, seed=4, arm="constant", only=3)
+    work = Worlds(modes(), classes, Wanted("L3", 15.0, 5.0), rules, seed=4, arm="constant", only=3)
     whole = work(next(iter(grid(world=np.arange(8)).units(8))))
     parts = [work(unit) for unit in grid(world=np.arange(8)).units(3)]
     for name, values in whole.items():
@@ -127,7 +127,7 @@ def test_a_latency_delays_every_mode_but_the_first() -> None:
     action[:, 0] = 1
     unit = next(iter(grid(world=np.arange(40)).units(40)))
     prompt, late = (
-        Worlds(still, classes, Setting(2.0, 6, latency_s=latency), Rules(action), seed=1)(unit)
+        Worlds(still, classes, Wanted("L3", 12.0, 2.0, latency), Rules(action), seed=1)(unit)
         for latency in (0.0, 1.9)
     )
     assert (prompt["entered"][:, :2] == 0).all()
@@ -140,7 +140,7 @@ def test_missed_looks_hold_the_mode() -> None:
     action = np.ones((1, 3, len(classes), 6), dtype=np.int64)
     rules = Rules(action, safe=0)
     unit = next(iter(grid(world=np.arange(200)).units(200)))
-    found = Worlds(modes(), classes, Setting(0.1, 3, missed=0.5), rules, seed=1)(unit)
+    found = Worlds(modes(), classes, Wanted("L3", 0.3, 0.1, missed=0.5), rules, seed=1)(unit)
     # In the safe mode until the first look: 1/2, 1/4, 1/8 of the worlds; 4 standard errors.
     for period in range(3):
         share = 0.5 ** (period + 1)
@@ -176,7 +176,9 @@ def test_modes_and_policies_in_turn_meet_every_draw_equally_often(
     given: list[float] = []
     monkeypatch.setattr(dw.TankBatch, "set", lambda _, **to: given.extend(to["force_std"].tolist()))
     for first in (0, 24):
-        work = Worlds(many, classes, Setting(0.1, 1), Rules(action), 4, first, turn=4, arm=arm)
+        work = Worlds(
+            many, classes, Wanted("L3", 0.1, 0.1), Rules(action), 4, first, turn=4, arm=arm
+        )
         for unit in grid(world=np.arange(first, first + 24)).units(7):
             work(unit)
         assert sorted(given) == list(range(24))

@@ -12,12 +12,12 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.join_history import LatticeWorld
-from driftwalk.assembly.lattice.joined_faces import ROUNDING, face_table
+from driftwalk.assembly.lattice.joined_faces import face_table
 from driftwalk.assembly.lattice.rigid_joins import CLOSING, JOINING, PARTING, BondGraph
 from driftwalk.assembly.outcomes.class_names import disc_class
 from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of
-from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
+from driftwalk.assembly.runs.plan import make_plan, start_poses, steps_of
 from driftwalk.assembly.runs.start import glued_cells, require_bonds, require_room
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
@@ -153,13 +153,8 @@ class LiveTank:
             As the class.
         """
         with self._lock, self._wishes_lock:
-            plan = make_plan(
-                self._wishes.study,
-                self._flow,
-                settings={"seed": seed},
-                index=np.arange(1),
-                ends=False,
-            )
+            study, settings = self._wishes.study, {"seed": seed}
+            plan = make_plan(study, self._flow, settings=settings, index=np.arange(1), ends=False)
             forces = plan.study.forces
             self._world = _core.LiveWorld(
                 self._model,
@@ -194,18 +189,11 @@ class LiveTank:
             When the duration is negative or too long, or the forces have become so large that the
             numbers are lost: then only `restart` helps.
         """
-        if not 0.0 <= duration_s < math.inf:
-            raise InputError(f"duration_s must be a finite number from 0 s on, got {duration_s}")
         with self._lock:
-            step = self._wishes.study.time_step_s
-            due = self._due + duration_s
-            steps = math.floor(min(due / step, 2.0 * MOST_STEPS) + ROUNDING)
-            if self._world.step + steps >= MOST_STEPS:
-                raise InputError(
-                    f"a world has at most {MOST_STEPS - 1} time steps of {step:g} s and has had "
-                    f"{self._world.step}: advance by less than {duration_s:g} s, or restart it"
-                )
-            self._due = due - steps * step
+            step, had = self._wishes.study.time_step_s, self._world.step
+            steps, self._due = steps_of(
+                duration_s, self._due, step=step, had=had, otherwise=", or restart it"
+            )
             self._go(steps)
             self._look()
             if self._world.status & BROKEN:

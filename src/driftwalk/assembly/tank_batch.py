@@ -12,16 +12,15 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.join_history import LatticeWorld
-from driftwalk.assembly.lattice.joined_faces import ROUNDING
 from driftwalk.assembly.outcomes.class_names import disc_class
 from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import (
-    MOST_STEPS,
     Backend,
     Plan,
     make_plan,
     start_poses,
+    steps_of,
     stream_keys,
 )
 from driftwalk.assembly.runs.start import glued_cells, require_room
@@ -260,17 +259,8 @@ class TankBatch:
         InputError
             When the duration is negative or too long.
         """
-        if not 0.0 <= duration_s < math.inf:
-            raise InputError(f"duration_s must be a finite number from 0 s on, got {duration_s}")
         step = self._study.time_step_s
-        due = self._due + duration_s
-        steps = math.floor(min(due / step, 2.0 * MOST_STEPS) + ROUNDING)
-        if self._batch.step + steps >= MOST_STEPS:
-            raise InputError(
-                f"a world has at most {MOST_STEPS - 1} time steps of {step:g} s and has had "
-                f"{self._batch.step}: advance by less than {duration_s:g} s"
-            )
-        self._due = due - steps * step
+        steps, self._due = steps_of(duration_s, self._due, step=step, had=self._batch.step)
         before = self._batch.last_event()
         while steps > 0:
             into = self._batch.step % self._steps_per_interval

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.assembly import Modes
-    from driftwalk.assembly.control.plan import Wanted
+    from driftwalk.assembly.control.worlds import Wanted
     from driftwalk.model import Study
     from driftwalk.runs.resumable_run import Run
 

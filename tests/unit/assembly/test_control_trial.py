@@ -28,7 +28,7 @@ def test_the_best_constant_mode_is_chosen_in_other_worlds_than_it_is_reported_in
     def made_up(work: Worlds, unit: WorkUnit) -> dict[str, np.ndarray]:
         world = unit.settings["world"]
         ran.append((work.arm, work.only, int(world[0]), int(world[-1])))
-        found = np.zeros((world.size, work.setting.periods), dtype=np.int16)
+        found = np.zeros((world.size, work.wanted.periods), dtype=np.int16)
         chosen = policy.attrs["worlds_used"] + 20 <= world[0] and work.only == 1
         after = found + (target if chosen else 0)
         return {"seen": found, "mode": found, "after": after, "entered": found}

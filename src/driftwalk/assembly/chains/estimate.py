@@ -33,6 +33,7 @@ from driftwalk.assembly.chains.mixing import (
     needed_events,
 )
 from driftwalk.assembly.outcomes.class_names import sort_classes
+from driftwalk.assembly.outcomes.distribution import with_limits
 from driftwalk.assembly.outcomes.steady_state import PARTS, clustering, rate_interval
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
@@ -170,15 +171,15 @@ def kinetics(
     drawn = grid(replicate=np.arange(replicates))
     bands = swept("bootstrap", again, drawn, whole - replicates)
     data, coords, attrs = _rates(sets, pairs, seed)
+    statistics = np.array([(one.statistic, one.low, one.high) for one in mixing.tests])
+    statistics = statistics.reshape(-1, 3).T
     data |= {
         "score": ("model", scores.mean(axis=1)),
         "score_behind": ("model", behind.mean(axis=1)),
         "score_behind_standard_error": ("model", error),
         **_over_time(sets, model, bands["share"]),
         **_chosen(model, pairs, bands["hazard"]),
-        "statistic": ("test", np.array([one.statistic for one in mixing.tests])),
-        "statistic_low": ("test", np.array([one.low for one in mixing.tests])),
-        "statistic_high": ("test", np.array([one.high for one in mixing.tests])),
+        **with_limits("statistic", "test", *statistics),
         "events": ("test", np.array([one.events for one in mixing.tests], dtype=np.int64)),
         "p": ("test", np.array([one.p for one in mixing.tests])),
         "p_corrected": ("test", mixing.corrected),
@@ -424,12 +425,11 @@ def _over_time(sets: Sequence[Histories], model: Model, band: Floats) -> dict[st
     duration, stored = sets[0].recorded_s(), KINETICS_POLICY.stored
     course = shares(model, duration, steps=5 * stored)[1][::5]
     wide = norm.ppf(0.5 + 0.5 * KINETICS_POLICY.confidence) * band.std(axis=0, ddof=1)
+    low, high = (np.clip(one, 0.0, 1.0) for one in (course - wide, course + wide))
     time = np.linspace(0.0, duration, stored + 1)
     seen = np.stack([empirical_shares(one, time) for one in sets])
     return {
-        "share": (("time", "class"), course),
-        "share_low": (("time", "class"), np.clip(course - wide, 0.0, 1.0)),
-        "share_high": (("time", "class"), np.clip(course + wide, 0.0, 1.0)),
+        **with_limits("share", ("time", "class"), course, low, high),
         "empirical": (("source", "time", "class"), seen),
     }
 

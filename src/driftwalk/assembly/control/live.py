@@ -97,9 +97,9 @@ class LiveControl:
         if spent < self._due:
             return None
         every = self._wanted.every_s
-        period = min(math.floor(spent / every + 1e-6), self._wanted.setting.periods - 1)
+        period = min(math.floor(spent / every + 1e-6), self._wanted.periods - 1)
         self._due = every * (period + 1)
-        return self._decide(outcome, time, self._wanted.setting.periods - period)
+        return self._decide(outcome, time, self._wanted.periods - period)
 
     def end(self) -> dict[str, Any]:
         """Return the line of the end, by the last frame; its time is None where none came."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -29,7 +29,7 @@ from driftwalk.assembly.control.decision_process import (
     value_iteration,
 )
 from driftwalk.assembly.control.modes import Modes
-from driftwalk.assembly.control.worlds import Rules, Setting, Worlds, decisions_of
+from driftwalk.assembly.control.worlds import Rules, Wanted, Worlds, decisions_of
 from driftwalk.assembly.outcomes.class_names import outcome_classes, target_class
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
@@ -149,42 +149,6 @@ class ControlPolicy(NamedTuple):
 CONTROL_POLICY = ControlPolicy()
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """A target and its deadline.
-
-    Attributes
-    ----------
-    target : str
-        Outcome class.
-    by_s : float
-        Deadline [s].
-    every_s : float
-        Period of the decisions [s].
-    latency_s, missed : float
-        As in `Setting`.
-    dwell_s : float
-        Time for which a mode is held at least [s].
-    """
-
-    target: str
-    by_s: float
-    every_s: float
-    latency_s: float = 0.0
-    missed: float = 0.0
-    dwell_s: float = 0.0
-
-    @property
-    def setting(self) -> Setting:
-        """The setting of the worlds."""
-        return Setting(self.every_s, round(self.by_s / self.every_s), self.latency_s, self.missed)
-
-    @property
-    def dwell(self) -> int:
-        """Periods for which a mode is held at least."""
-        return max(int(np.ceil(self.dwell_s / self.every_s - 1e-6)), 1)
-
-
 def check_control(modes: Modes, wanted: Wanted) -> Wanted:
     """Return what is wanted, its target as runs name it; refuse what no policy can be planned for.
 
@@ -241,7 +205,7 @@ def check_control(modes: Modes, wanted: Wanted) -> Wanted:
             f"the deadline of {wanted.by_s:g} s is no whole number of periods of "
             f"{wanted.every_s:g} s: choose another deadline or period"
         )
-    wanted.setting.require_in_range()
+    wanted.require_in_range()
     if not 0.0 <= wanted.dwell_s <= wanted.by_s:
         raise InputError(f"the dwell is from 0 s to the deadline, got {wanted.dwell_s:g} s")
     return replace(wanted, target=target)
@@ -405,7 +369,7 @@ class _Planner:
             seen, classes=len(self.classes), modes=self.modes.size, random=random
         )
         target = self.classes.index(self.wanted.target)
-        plan = value_iteration(probability, target=target, periods=self.wanted.setting.periods)
+        plan = value_iteration(probability, target=target, periods=self.wanted.periods)
         start = self.classes.index(all_single(self.modes.study.assembly.blocks))
         return gains(probability, plan), float(plan.value[-1, start, 0])
 
@@ -425,7 +389,7 @@ class _Planner:
         before, self.done = self.done, self.done + count
         rules = Rules(tables.astype(np.int16), self.safe, self.wanted.dwell)
         work = Worlds(
-            self.modes, self.classes, self.wanted.setting, rules, self.seed, begin, **how
+            self.modes, self.classes, self.wanted, rules, self.seed, begin, **how
         )  # fmt: skip
         return run_sweep(
             work,
@@ -467,8 +431,7 @@ class _Planner:
             "x": ("x", flow["x"].values),
         }
         return build_dataset("control_policy", data, coords, {
-            "target": wanted.target, "by_s": wanted.by_s, "every_s": wanted.every_s,
-            "latency_s": wanted.latency_s, "missed": wanted.missed, "dwell_s": wanted.dwell_s,
+            **asdict(wanted),
             "reached": float(fresh.mean()), "reached_low": float(low), "reached_high": float(high),
             "confidence": share, "worlds": int(fresh.size), "worlds_used": self.used,
             "constant_worlds": each, "safe_mode": modes.name[int(constant.argmax())],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from driftwalk.assembly.control.plan import (
     stored_rules,
     stored_wanted,
 )
-from driftwalk.assembly.control.worlds import Setting, Worlds
+from driftwalk.assembly.control.worlds import Wanted, Worlds
+from driftwalk.assembly.outcomes.distribution import with_limits
 from driftwalk.assembly.runs.dataset import build_path
 from driftwalk.assembly.runs.plan import make_plan
 from driftwalk.assembly.tank_batch import TankBatch
@@ -84,8 +86,8 @@ def try_control(
     --------
     ``try_control(policy, worlds=2000)["reached"]``
     """
-    rules, wanted, modes = stored_rules(policy), stored_wanted(policy), stored_modes(policy)
-    setting = trial_setting(policy, worlds, latency, missed, force_factor)
+    rules, modes = stored_rules(policy), stored_modes(policy)
+    wanted = trial_setting(policy, worlds, latency, missed, force_factor)
     classes = tuple(str(name) for name in policy["class"].values)
     target, seed = classes.index(wanted.target), int(policy.attrs["seed"])
     # Behind all worlds of the plan; the best constant mode is chosen in the worlds after them.
@@ -97,7 +99,9 @@ def try_control(
         nonlocal done
         before, done = done, done + worlds
         return run_sweep(
-            Worlds(modes, classes, setting, rules, seed, arm=arm, only=only),
+            Worlds(
+                modes, classes, wanted, rules, seed, arm=arm, only=only, force_factor=force_factor
+            ),
             grid(world=np.arange(begin, begin + worlds)).units(CONTROL_POLICY.unit),
             store=None if store is None else store(name),
             executor=executor,
@@ -122,12 +126,8 @@ def try_control(
     counts = [reached[0].sum(), round(stated * planned)]
     less, more = difference_interval(counts, [worlds, planned], confidence=share)
     data = {
-        "reached": ("arm", reached.mean(axis=1)),
-        "reached_low": ("arm", low),
-        "reached_high": ("arm", high),
-        "gain": ("arm", gain),
-        "gain_low": ("arm", gain - half),
-        "gain_high": ("arm", gain + half),
+        **with_limits("reached", "arm", reached.mean(axis=1), low, high),
+        **with_limits("gain", "arm", gain, gain - half, gain + half),
         "share": (("arm", "time"), np.pad(hits.mean(axis=1), ((0, 0), (1, 0)))),
         "usage": (("arm", "mode"), np.stack([_usage(one, whole, modes.size) for one in found])),
         "class_usage": (
@@ -142,13 +142,13 @@ def try_control(
     }  # fmt: skip
     coords = {
         "arm": ("arm", np.array(ARMS, dtype=object)),
-        "time": ("time", setting.every_s * np.arange(setting.periods + 1.0)),
+        "time": ("time", wanted.every_s * np.arange(wanted.periods + 1.0)),
         "mode": ("mode", np.array(modes.name, dtype=object)),
         "class": ("class", np.array(classes, dtype=object)),
     }
     return build_dataset("control_test", data, coords, {
         "target": wanted.target, "by_s": wanted.by_s, "every_s": wanted.every_s,
-        "latency_s": setting.latency_s, "missed": setting.missed, "force_factor": force_factor,
+        "latency_s": wanted.latency_s, "missed": wanted.missed, "force_factor": force_factor,
         "stated": stated, "stated_worlds": planned, "difference_low": float(less),
         "difference_high": float(more),
         "verdict": "as stated" if less <= 0.0 <= more else "not as stated",
@@ -217,8 +217,8 @@ def trial_setting(
     latency: float | None,
     missed: float | None,
     force_factor: float,
-) -> Setting:
-    """Return the setting of a test; refuse numbers that are out of range.
+) -> Wanted:
+    """Return what a test has of its policy and options; refuse numbers that are out of range.
 
     Parameters
     ----------
@@ -231,17 +231,16 @@ def trial_setting(
         When a number is out of range.
     """
     wanted = stored_wanted(policy)
-    setting = Setting(
-        wanted.every_s,
-        wanted.setting.periods,
-        wanted.latency_s if latency is None else latency,
-        wanted.missed if missed is None else missed,
-        force_factor,
-    )
+    if latency is not None:
+        wanted = replace(wanted, latency_s=latency)
+    if missed is not None:
+        wanted = replace(wanted, missed=missed)
     if worlds < 20:
         raise InputError(f"at least 20 worlds are needed, got {worlds}")
-    setting.require_in_range()
-    return setting
+    wanted.require_in_range()
+    if not 0.0 < force_factor < np.inf:
+        raise InputError(f"the factor on sigma_F has to be above 0, got {force_factor:g}")
+    return wanted
 
 
 def _paired(difference: Floats, confidence: float) -> tuple[Floats, Floats]:

@@ -108,31 +108,44 @@ STREAM = 1
 
 
 @dataclass(frozen=True)
-class Setting:
-    """Decisions, and how late and how well the tank is seen.
+class Wanted:
+    """A target and its deadline, and how late and how well the tank is seen.
 
     Attributes
     ----------
+    target : str
+        Outcome class.
+    by_s : float
+        Deadline [s].
     every_s : float
         Period of the decisions [s].
-    periods : int
-        Decisions up to the deadline.
     latency_s : float
         From a look at the tank until the pumps have changed [s], below a period.
     missed : float
         Share of the looks that give no class.
-    force_factor : float
-        Factor on sigma_F of the simulated worlds, to try a model that is wrong.
+    dwell_s : float
+        Time for which a mode is held at least [s].
     """
 
+    target: str
+    by_s: float
     every_s: float
-    periods: int
     latency_s: float = 0.0
     missed: float = 0.0
-    force_factor: float = 1.0
+    dwell_s: float = 0.0
+
+    @property
+    def periods(self) -> int:
+        """Decisions up to the deadline."""
+        return round(self.by_s / self.every_s)
+
+    @property
+    def dwell(self) -> int:
+        """Periods for which a mode is held at least."""
+        return max(int(np.ceil(self.dwell_s / self.every_s - 1e-6)), 1)
 
     def require_in_range(self) -> None:
-        """Refuse a latency, a share of missed looks or a factor out of range."""
+        """Refuse a latency or a share of missed looks out of range."""
         if not 0.0 <= self.latency_s < self.every_s:
             raise InputError(
                 f"the latency has to be below the {self.every_s:g} s between two decisions, got "
@@ -140,8 +153,6 @@ class Setting:
             )
         if not 0.0 <= self.missed < 1.0:
             raise InputError(f"the share of missed looks is from 0 to below 1, got {self.missed:g}")
-        if not 0.0 < self.force_factor < np.inf:
-            raise InputError(f"the factor on sigma_F has to be above 0, got {self.force_factor:g}")
 
 
 @dataclass(frozen=True)
@@ -154,7 +165,7 @@ class Worlds:
         The modes.
     classes : tuple of str
         Outcome classes that are known; others have the number `UNKNOWN`.
-    setting : Setting
+    wanted : Wanted
         Decisions, latency and missed looks.
     rules : Rules
         The policy.
@@ -169,17 +180,20 @@ class Worlds:
         The policy, one mode for each world in turn, or another random mode at each decision.
     only : int or None
         The constant mode, where it is one.
+    force_factor : float
+        Factor on sigma_F of the worlds, to try a model that is wrong.
     """
 
     modes: Modes
     classes: tuple[str, ...]
-    setting: Setting
+    wanted: Wanted
     rules: Rules
     seed: int
     first: int = 0
     turn: int = 1
     arm: Literal["policy", "constant", "random"] = "policy"
     only: int | None = None
+    force_factor: float = 1.0
 
     def __call__(self, unit: WorkUnit) -> Arrays:
         """Return what the worlds of a unit did, shapes (world, period).
@@ -191,7 +205,7 @@ class Worlds:
         from driftwalk.assembly.tank_batch import TankBatch
 
         world = np.asarray(unit.settings["world"], dtype=np.int64)
-        setting, periods = self.setting, self.setting.periods
+        every, latency, periods = self.wanted.every_s, self.wanted.latency_s, self.wanted.periods
         batch = TankBatch(
             self.modes.study, self.modes.flows, worlds=world.size, seed=self.seed,
             first=int(world[0]), workers=1, complete="rests",
@@ -207,13 +221,13 @@ class Worlds:
         seen = numbers(batch.outcome, number)
         for period in range(periods):
             since = np.asarray(batch.class_since)
-            age = ages(period * setting.every_s - since, setting.every_s)
+            age = ages(period * every - since, every)
             known = np.where(missed[:, period], UNKNOWN, seen)
             mode = controller.decide(known, age, left=periods - period, wish=wishes[:, period])
-            if setting.latency_s > 0.0 and period > 0:
-                batch.advance(setting.latency_s)
-            batch.set(**self.modes.settings(mode, draw, force_factor=setting.force_factor))
-            batch.advance(setting.every_s - (setting.latency_s if period > 0 else 0.0))
+            if latency > 0.0 and period > 0:
+                batch.advance(latency)
+            batch.set(**self.modes.settings(mode, draw, force_factor=self.force_factor))
+            batch.advance(every - (latency if period > 0 else 0.0))
             after = numbers(batch.outcome, number)
             entered = (after != seen) | (np.asarray(batch.class_since) > since)
             for name, values in (
@@ -226,17 +240,17 @@ class Worlds:
 
     def _drawn(self, world: Integers) -> tuple[Integers, Integers]:
         """Return the modes that are wished for, and where the look gives no class."""
-        periods, modes = self.setting.periods, self.modes.size
+        periods, modes = self.wanted.periods, self.modes.size
         wish = np.full((world.size, periods), -1)
         lost = np.zeros((world.size, periods), dtype=bool)
         if self.arm == "constant":
             wish[:] = (world % modes if self.only is None else np.full(world.size, self.only))[
                 :, None
             ]
-        if self.arm == "random" or self.setting.missed > 0.0:
+        if self.arm == "random" or self.wanted.missed > 0.0:
             for row, number in enumerate(world.tolist()):
                 random = np.random.default_rng([self.seed, number, STREAM])
-                lost[row] = random.random(periods) < self.setting.missed
+                lost[row] = random.random(periods) < self.wanted.missed
                 if self.arm == "random":
                     wish[row] = random.integers(modes, size=periods)
         return wish, lost

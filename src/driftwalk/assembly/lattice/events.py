@@ -13,7 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import FaceTable
-from driftwalk.assembly.lattice.many_blocks import DiscWorld, SquareWorld, replay_many
+from driftwalk.assembly.lattice.many_blocks import (
+    DiscWorld,
+    ReplayedEvents,
+    SquareWorld,
+    replay_many,
+)
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
 from driftwalk.assembly.lattice.rigid_joins import (
     CLOSING,
@@ -33,27 +38,6 @@ from driftwalk.assembly.outcomes.class_names import (
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import MOST_NAMED, all_single, moved_to_origin
-
-
-class ReplayedEvents(NamedTuple):
-    """Results of the events of some runs; -1 where a run had no such event."""
-
-    event_assembly: npt.NDArray[np.int32]
-    """Lowest block of the assembly that stayed and of the one that moved, (run, event, side); of a
-    parting of the two parts."""
-    event_shape: npt.NDArray[np.int32]
-    """Shapes of the two and of what they became, (run, event, part): indices into `shapes`. Of a
-    parting those of the two parts and of what they were; -1 where only a bond of a loop changed."""
-    event_class: npt.NDArray[np.int32]
-    """Outcome class of the world after the event, (run, event): an index into `classes`."""
-    outcome: npt.NDArray[np.int32]
-    """Outcome class at the end, (run,): an index into `classes`."""
-    classes: tuple[str, ...]
-    """Names of the classes: all for up to 8 blocks, beyond that those that occurred."""
-    shapes: tuple[str, ...]
-    """Names of the shapes, by the same rule."""
-    kind: Integers | None = None
-    """Kinds of the blocks at the end, (run, block); None where faces have no types."""
 
 
 def replay_events(
@@ -125,10 +109,7 @@ def replay_events(
         many = _replay_many(events, end, lambda _: SquareWorld(blocks, chirality))
         return many._replace(kind=kind)
     replay = _Replay(end.assembly.shape, events, chirality=chirality)
-    for event in range(int(events.number.max(initial=0))):
-        replay.apply(event, np.flatnonzero(events.number > event), events)
-    _check_end(replay.lattice, end)
-    return replay.result()._replace(kind=kind)
+    return replay.result(events, end)._replace(kind=kind)
 
 
 def replay_contacts(
@@ -178,19 +159,15 @@ def replay_contacts(
             return DiscWorld(pose.shape[1], pairs, noun=noun)
 
         return _replay_many(events, end, world_of)
-    replay = _DiscReplay(pose, events, diameter=diameter, width=width)
-    for event in range(int(events.number.max(initial=0))):
-        replay.apply(event, np.flatnonzero(events.number > event), events)
-    _check_end(replay.lattice, end)
-    return replay.result()
+    return _DiscReplay(pose, events, diameter=diameter, width=width).result(events, end)
 
 
 def _replay_many(
     events: _Events, end: _Lattice, world_of: Callable[[int], SquareWorld]
 ) -> ReplayedEvents:
-    found = replay_many(*events, blocks=end.assembly.shape[1], world_of=world_of)
-    _check_end(_Lattice(found.cell, found.quarter, found.assembly), end)
-    return ReplayedEvents(*found[:6])
+    found, state = replay_many(*events, blocks=end.assembly.shape[1], world_of=world_of)
+    _check_end(_Lattice(*state), end)
+    return found
 
 
 def _follow_kinds(events: _Events, faces: FaceTable, shape: tuple[int, ...]) -> Integers:
@@ -321,7 +298,11 @@ class _Replay:
     def _separate(self, at: Integers, side: Bools) -> None:
         """Note that what is marked has parted from the others of the run."""
 
-    def result(self) -> ReplayedEvents:
+    def result(self, events: _Events, end: _Lattice) -> ReplayedEvents:
+        """Apply all events, and return what they did; refuse those that lead elsewhere."""
+        for event in range(int(events.number.max(initial=0))):
+            self.apply(event, np.flatnonzero(events.number > event), events)
+        _check_end(self.lattice, end)
         shapes = listed_shapes(self.shapes.known, self.blocks, chirality=self.chirality)
         classes = listed_classes(self.classes.known, self.blocks, chirality=self.chirality)
         shape_index, class_index = self.shapes.index_into(shapes), self.classes.index_into(classes)

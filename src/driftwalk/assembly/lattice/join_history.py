@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import Join
-from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of
+from driftwalk.assembly.lattice.polyomino import Chirality, name_of, put_beside
 from driftwalk.assembly.outcomes.class_names import class_name
 from driftwalk.schema.shapes import MOST_NAMED, Cell, counted_class, moved_to_origin
 
@@ -202,29 +202,16 @@ class LatticeWorld:
         moving = self.partition.moves(blocks)
         stays, moves = blocks[1 - moving], blocks[moving]
         outward = (faces[1 - moving] + self.quarter[stays]) % 4
-        place = _sum(self.cell[stays], STEPS[outward])
         turn = (outward + 2 - faces[moving] - self.quarter[moves]) % 4
         label, other = (self.partition.labels[block] for block in (stays, moves))
-        if label == other:
-            return place == self.cell[moves] and turn == 0
         moved = self.partition.members(other)
-        x, y = self.cell[moves]
-        cells = [
-            _sum(place, _turned((self.cell[block][0] - x, self.cell[block][1] - y), turn))
-            for block in moved
-        ]
+        own = [self.cell[block] for block in moved]
+        cells = put_beside(own, self.cell[moves], self.cell[stays], outward, turn)
+        if label == other:
+            return cells == own and turn == 0
         if set(cells) & {self.cell[block] for block in self.partition.members(label)}:
             return False
         for block, cell in zip(moved, cells, strict=True):
             self.cell[block] = cell
             self.quarter[block] = (self.quarter[block] + turn) % 4
         return self.partition.unite(blocks)
-
-
-def _sum(one: Cell, other: Cell) -> Cell:
-    return one[0] + other[0], one[1] + other[1]
-
-
-def _turned(cell: Cell, quarters: int) -> Cell:
-    x, y = cell
-    return ((x, y), (-y, x), (-x, -y), (y, -x))[quarters]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, shape_order
+from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, put_beside, shape_order
 from driftwalk.assembly.lattice.rigid_joins import CLOSING, JOINING, OPENING, PARTING
 from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError
@@ -28,18 +28,25 @@ from driftwalk.schema.shapes import (
 )
 
 
-class ManyReplayed(NamedTuple):
-    """As `ReplayedEvents`, and the state at the end."""
+class ReplayedEvents(NamedTuple):
+    """Results of the events of some runs; -1 where a run had no such event."""
 
     event_assembly: npt.NDArray[np.int32]
+    """Lowest block of the assembly that stayed and of the one that moved, (run, event, side); of a
+    parting of the two parts."""
     event_shape: npt.NDArray[np.int32]
+    """Shapes of the two and of what they became, (run, event, part): indices into `shapes`. Of a
+    parting those of the two parts and of what they were; -1 where only a bond of a loop changed."""
     event_class: npt.NDArray[np.int32]
+    """Outcome class of the world after the event, (run, event): an index into `classes`."""
     outcome: npt.NDArray[np.int32]
+    """Outcome class at the end, (run,): an index into `classes`."""
     classes: tuple[str, ...]
+    """Names of the classes: all for up to 8 blocks, beyond that those that occurred."""
     shapes: tuple[str, ...]
-    cell: Integers
-    quarter: Integers
-    assembly: Integers
+    """Names of the shapes, by the same rule."""
+    kind: Integers | None = None
+    """Kinds of the blocks at the end, (run, block); None where faces have no types."""
 
 
 class SquareWorld:
@@ -124,19 +131,14 @@ class SquareWorld:
         """Put the moved squares on the lattice of the others; return how many faces meet."""
         outward = (face[0] + self.quarter[block[0]]) % 4
         turn = (outward + 2 - face[1] - self.quarter[block[1]]) % 4
-        (x0, y0), (x1, y1) = self.cell[block[0]], self.cell[block[1]]
-        east, north = STEPS[outward]
-        cosine, sine = STEPS[turn]
-        taken, there = self.taken[stays], []
-        for member in self.members[moves]:
-            x, y = self.cell[member]
-            x, y = x - x1, y - y1
-            x, y = x0 + east + cosine * x - sine * y, y0 + north + sine * x + cosine * y
-            self.cell[member] = (x, y)
-            self.quarter[member] = (self.quarter[member] + turn) % 4
-            there.append((x, y))
+        own = [self.cell[member] for member in self.members[moves]]
+        there = put_beside(own, self.cell[block[1]], self.cell[block[0]], outward, turn)
+        taken = self.taken[stays]
         if not taken.isdisjoint(there):
             raise InputError("puts two blocks into one cell")
+        for member, cell in zip(self.members[moves], there, strict=True):
+            self.cell[member] = cell
+            self.quarter[member] = (self.quarter[member] + turn) % 4
         met = sum((x + dx, y + dy) in taken for x, y in there for dx, dy in STEPS)
         taken.update(there)
         self.taken[moves] = set()
@@ -199,8 +201,8 @@ def replay_many(
     *,
     blocks: int,
     world_of: Callable[[int], SquareWorld],
-) -> ManyReplayed:
-    """Replay the events of runs of many blocks.
+) -> tuple[ReplayedEvents, tuple[Integers, Integers, Integers]]:
+    """Replay the events of runs of many blocks, return cells, quarters and assemblies after them.
 
     Parameters
     ----------
@@ -270,15 +272,15 @@ def replay_many(
     shapes = tuple(sorted(known, key=shape_order))
     index = {name: at for at, name in enumerate(shapes)}
     shape_at = np.array([*(index[name] for name in known), -1], dtype=np.int32)
-    return ManyReplayed(
+    found = ReplayedEvents(
         event_assembly,
         shape_at[event_shape],
         np.where(happened, place[left], np.int32(-1)),
         place[at_end],
         tuple(counted_class(int(one)) for one in occurred),
         shapes,
-        *(cell, quarter, assembly),
     )
+    return found, (cell, quarter, assembly)
 
 
 def _touch_all(

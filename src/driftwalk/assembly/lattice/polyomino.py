@@ -238,6 +238,14 @@ def neighbours(cells: Cells) -> set[Cell]:
     return {(x + dx, y + dy) for x, y in cells for dx, dy in STEPS} - set(cells)
 
 
+def put_beside(cells: list[Cell], one: Cell, other: Cell, face: int, turn: int) -> list[Cell]:
+    """Return cells turned by quarters about one of them, which comes to a face of another cell."""
+    (east, north), (cosine, sine) = STEPS[face], STEPS[turn]
+    x0, y0 = other[0] + east, other[1] + north
+    away = [(x - one[0], y - one[1]) for x, y in cells]
+    return [(x0 + cosine * x - sine * y, y0 + sine * x + cosine * y) for x, y in away]
+
+
 def _is_connected(cells: Cells) -> bool:
     left, ahead = set(cells), list(cells[:1])
     while ahead:

@@ -87,7 +87,7 @@ def outcome_distribution(
     if isinstance(assembly_or_counts, xr.Dataset):
         require_assembly(assembly_or_counts, "outcome")
         names = class_names(assembly_or_counts)
-        attrs = {k: v for k, v in assembly_or_counts.attrs.items() if k not in NOT_COPIED}
+        attrs = copied_attrs(assembly_or_counts)
         if time is None:
             outcome = assembly_or_counts["outcome"].values
             attrs["time_s"] = duration(assembly_or_counts)
@@ -133,14 +133,11 @@ def class_at(assembly: xr.Dataset, time: npt.ArrayLike) -> npt.NDArray[np.int32]
     require_assembly(assembly, "outcome", "event_time", "event_class")
     times = np.asarray(time, dtype=np.float64)
     check_times(times, duration(assembly))
-    events, clock = assembly["event_class"].values, assembly["event_time"].values
+    events = assembly["event_class"].values.astype(np.int32)
     start = class_names(assembly).index(all_single(int(assembly.attrs["blocks"])))
-    begin = np.full((len(events), 1), start)
-    history = np.concatenate([begin, events], axis=1).astype(np.int32)
-    history[assembly["outcome"].values < 0] = -1
-    run = np.arange(len(events))
-    rows = [history[run, (clock <= moment).sum(axis=1)] for moment in times.flat]
-    return np.array(rows, dtype=np.int32).reshape(*times.shape, len(events))
+    found = at_times(assembly["event_time"].values, events, start, times.ravel())
+    found[assembly["outcome"].values < 0] = -1
+    return np.ascontiguousarray(found.T).reshape(*times.shape, len(events))
 
 
 def sampling_variance(proportion: npt.ArrayLike, runs: npt.ArrayLike) -> Floats:
@@ -187,6 +184,40 @@ def class_names(assembly: xr.Dataset) -> list[str]:
     names = [str(name) for name in assembly["class"].values]
     start = all_single(int(assembly.attrs["blocks"]))
     return names if start in names else [*names, start]
+
+
+def with_limits(
+    name: str, dims: str | tuple[str, ...], value: Any, low: Any, high: Any
+) -> dict[str, Any]:
+    """Return numbers and the limits of their intervals, as variables of a dataset."""
+    return {name: (dims, value), f"{name}_low": (dims, low), f"{name}_high": (dims, high)}
+
+
+def copied_attrs(assembly: xr.Dataset) -> dict[str, Any]:
+    """Return the attributes of an assembly dataset that what is made of it has too."""
+    return {key: value for key, value in assembly.attrs.items() if key not in NOT_COPIED}
+
+
+def at_times(
+    event_time: Floats, course: npt.NDArray[Any], start: float, times: npt.NDArray[np.float64]
+) -> npt.NDArray[Any]:
+    """Return what the events so far have made of a course, shape (run, time).
+
+    Parameters
+    ----------
+    event_time, course : ndarray, shape (run, event)
+        Times, NaN where there is no event, and what each event leads to.
+    start : float
+        Where the course begins.
+    times : ndarray
+        An event at that very time has happened.
+    """
+    begin = np.full((len(course), 1), start, dtype=course.dtype)
+    whole = np.concatenate([begin, course], axis=1)
+    happened = np.empty((len(course), times.size), dtype=np.intp)
+    for at, moment in enumerate(times):
+        happened[:, at] = (event_time <= moment).sum(axis=1)
+    return np.take_along_axis(whole, happened, axis=1)
 
 
 def is_complete(names: list[str]) -> Bools:

@@ -15,10 +15,12 @@ from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
 from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
 from driftwalk.assembly.outcomes.distribution import (
-    NOT_COPIED,
+    at_times,
+    copied_attrs,
     duration,
     require_assembly,
     runs_with_outcome,
+    with_limits,
 )
 from driftwalk.assembly.outcomes.survival import checked_times
 from driftwalk.core.arrays import Bools, Floats, Integers
@@ -123,8 +125,7 @@ def assembly_sizes(
         ("free_share", "time", courses[2], (0.0, 1.0)),
         ("compactness", "time", compact, (0.0, 1.0)),
     ):
-        mean, low, high = _over_runs(values, confidence, possible)
-        data |= {name: (dim, mean), f"{name}_low": (dim, low), f"{name}_high": (dim, high)}
+        data |= with_limits(name, dim, *_over_runs(values, confidence, possible))
     end = np.array([np.inf])
     at_end = _compactness_of_runs(event_time, event_shape, sign, shapes, size, end)
     ends = _over_runs(at_end, confidence, (0.0, 1.0))
@@ -135,7 +136,7 @@ def assembly_sizes(
         data,
         {"size": ("size", first), "size_to": ("size", last), "time": ("time", time)},
         {
-            **{key: value for key, value in assembly.attrs.items() if key not in NOT_COPIED},
+            **copied_attrs(assembly),
             **attrs,
             "compactness_runs": int(np.isfinite(at_end).sum()),
             "runs": int(sound.sum()),
@@ -203,7 +204,7 @@ def _courses(
     if (sign < 0).any():
         largest = _largest(event_size, sign, blocks)
     joined, freed, largest = (
-        _at_times(event_time, course, start, time)
+        at_times(event_time, course, start, time)
         for course, start in ((joined, 0), (freed, 0), (largest, 1))
     )
     return blocks / (blocks - joined), largest / blocks, 1.0 - freed / blocks
@@ -225,17 +226,6 @@ def _largest(event_size: Integers, sign: Integers, blocks: int) -> Integers:
     return largest
 
 
-def _at_times(
-    event_time: Floats, course: npt.NDArray[Any], start: float, time: Floats
-) -> npt.NDArray[Any]:
-    """Return what a course has come to by the events so far, shape (run, time)."""
-    ordered = [row[np.isfinite(row)] for row in event_time]
-    happened = np.array([np.searchsorted(row, time, side="right") for row in ordered])
-    begin = np.full((len(course), 1), start, dtype=course.dtype)
-    course = np.concatenate([begin, course], axis=1)
-    return np.asarray(np.take_along_axis(course, happened, axis=1))
-
-
 def _compactness_of_runs(
     event_time: Floats,
     event_shape: Integers,
@@ -250,7 +240,7 @@ def _compactness_of_runs(
     shaped = np.where((size >= 4) & ~graphs, size, 0)
     weighted = np.array([n and n * compactness(one) for n, one in zip(shaped, shapes, strict=True)])
     changes = (((one[event_shape] * (-1, -1, 1)).sum(axis=2) * sign) for one in (weighted, shaped))
-    total, blocks = (_at_times(event_time, one.cumsum(axis=1), 0, time) for one in changes)
+    total, blocks = (at_times(event_time, one.cumsum(axis=1), 0, time) for one in changes)
     unknown = np.full(total.shape, np.nan)
     return np.asarray(np.divide(total, blocks, out=unknown, where=blocks > 0))
 

@@ -15,11 +15,12 @@ import numpy.typing as npt
 
 from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
 from driftwalk.assembly.outcomes.distribution import (
-    NOT_COPIED,
     class_names,
+    copied_attrs,
     duration,
     require_assembly,
     runs_with_outcome,
+    with_limits,
 )
 from driftwalk.assembly.outcomes.survival import survival_curve
 from driftwalk.core.arrays import Bools, Floats, Integers
@@ -109,14 +110,11 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
     shares = _shares(stays, np.linspace(begin, last, batches + 1), runs, len(names))
     joined = np.concatenate([shares[:, : batches // 2], shares[:, batches // 2 :]])
     parts = shares.mean(axis=1) if batches == 2 else shares.reshape(-1, len(names))
-    mean, low, high = _mean_and_ends(parts, confidence)
     half = joined.shape[0] // 2
     p = _steadiness((joined[half:] - joined[:half]).reshape(-1, len(names)))
     time = np.bincount(stays.state, weights=stays.lasts, minlength=len(names)).astype(np.float64)
     data: dict[str, Any] = {
-        "time_share": ("class", mean),
-        "time_share_low": ("class", low),
-        "time_share_high": ("class", high),
+        **with_limits("time_share", "class", *_mean_and_ends(parts, confidence)),
         "class_time": ("class", time),
     }
     for name, kind in (("joining", JOINING), ("parting", PARTING)):
@@ -131,7 +129,7 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
         data | curves,
         {"class": ("class", np.array(names, dtype=object)), "age": ("age", age)},
         {
-            **{key: value for key, value in assembly.attrs.items() if key not in NOT_COPIED},
+            **copied_attrs(assembly),
             "runs": runs,
             "left_out": int((~sound).sum()),
             "confidence": confidence,
@@ -242,11 +240,8 @@ def _lifetimes(stays: _Stays, classes: int, confidence: float) -> tuple[Floats, 
         found = survival_curve(over, stays.lasts[own], times=age, confidence=confidence)
         curve[:, :, state] = found.survival, found.low, found.high
         median[:, state] = found.median, found.median_low, found.median_high
-    data: dict[str, Any] = {}
-    for end, one, half in zip(("", "_low", "_high"), curve, median, strict=True):
-        data[f"survival{end}"] = (("age", "class"), one)
-        data[f"lifetime_median{end}"] = ("class", half)
-    return age, data
+    curves = with_limits("survival", ("age", "class"), *curve)
+    return age, curves | with_limits("lifetime_median", "class", *median)
 
 
 PARTS: Final = 5
@@ -382,7 +377,5 @@ def rate_variables(
     rate = np.divide(number, span, out=np.full(span.shape, np.nan), where=span > 0)
     return {
         f"{name}_count": (dim, number.astype(np.int64)),
-        f"{name}_rate": (dim, rate),
-        f"{name}_rate_low": (dim, low),
-        f"{name}_rate_high": (dim, high),
+        **with_limits(f"{name}_rate", dim, rate, low, high),
     }

@@ -18,6 +18,7 @@ from driftwalk.assembly.outcomes.distribution import (
     duration,
     require_assembly,
     runs_with_outcome,
+    with_limits,
 )
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
@@ -114,20 +115,15 @@ def class_times(
         time=time,
         classes=len(names),
     )
-    low, high = proportion_interval(count, runs, confidence=confidence)
-    shares = {"proportion": count / runs, "proportion_low": low, "proportion_high": high}
-    data: dict[str, Any] = {name: (("time", "class"), share) for name, share in shares.items()}
+    limits = proportion_interval(count, runs, confidence=confidence)
+    data = with_limits("proportion", ("time", "class"), count / runs, *limits)
     attrs: dict[str, Any] = {}
     end_time = assembly["end_time"].values[sound]
     for event in EVENTS:
         curve = survival_curve(
             assembly[f"{event}_time"].values[sound], end_time, times=time, confidence=confidence
         )
-        data |= {
-            event: ("time", curve.survival),
-            f"{event}_low": ("time", curve.low),
-            f"{event}_high": ("time", curve.high),
-        }
+        data |= with_limits(event, "time", curve.survival, curve.low, curve.high)
         attrs |= {
             f"{event}_median_s": curve.median,
             f"{event}_median_low_s": curve.median_low,

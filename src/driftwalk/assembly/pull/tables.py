@@ -69,27 +69,6 @@ EACH_STEP: Final = Stepping(1, 0.0, 1.0)
 """Of forces that all act in each step."""
 
 
-def stepping_of(
-    force: Callable[[Floats], Floats], *, nearest: float, cutoff: float, mass: float, step: float
-) -> Stepping:
-    """Part the force of two faces; where it is near up to its end, all acts in each step.
-
-    Parameters
-    ----------
-    force : callable
-        Of two faces on one axis [N], from distances [m].
-    nearest, cutoff : float
-        Distance of two faces up to which they are near in any case; where the force ends [m].
-    mass, step : float
-        Of a block [kg]; time step [s].
-    """
-    reach = np.geomspace(nearest, cutoff, 2000)
-    curved = np.abs(np.gradient(force(reach), reach)) * 4.0 * (STEPPING.every * step) ** 2 / mass
-    near = float(reach[np.flatnonzero(np.append(True, curved[:-1] > STEPPING.stiffness))[-1]])
-    end = STEPPING.fade * near
-    return Stepping(STEPPING.every, near**2, end**2) if end < cutoff else EACH_STEP
-
-
 GRAVITY: Final = 9.81
 """[m/s²]"""
 CELL_BITS: Final = 17
@@ -344,7 +323,7 @@ def _block_pull(
     # A bond that breaks by its load would feel the impulse of a cycle as a force.
     if faces is not None and magnet is not None and not loaded:
         nearest = max(faces.capped_at, end if far is not None else 0.0)
-        tables = _stepped(tables, faces, nearest=nearest, mass=mass, step=step, others=others)
+        tables = _stepped(tables, faces, others, nearest=nearest, mass=mass, step=step)
     tables.radial.update(
         {what: force.cells() for what, force in radial.items() if force is not None}
     )
@@ -352,17 +331,31 @@ def _block_pull(
 
 
 def _stepped(
-    tables: PullTables,
-    faces: RadialForce,
-    *,
-    nearest: float,
-    mass: float,
-    step: float,
-    others: list[float],
-) -> PullTables:
-    found = stepping_of(faces, nearest=nearest, cutoff=faces.cutoff, mass=mass, step=step)
-    near = math.sqrt(found.near_end) + 2.0 * tables.lever
-    return tables._replace(stepping=found, near_reach=max([near, *others]))
+    tables: PullTables, faces: RadialForce, others: list[float], *,
+    nearest: float, mass: float, step: float,
+) -> PullTables:  # fmt: skip
+    """Part the force of two faces; where it is near up to its end, all acts in each step.
+
+    Parameters
+    ----------
+    tables : PullTables
+        The tables without steps of their own.
+    faces : RadialForce
+        Attraction of the faces.
+    others : list of float
+        How far the other forces reach [m], which act in each step.
+    nearest : float
+        Least distance from which all may be distant [m].
+    mass, step : float
+        Mass of a block with the water that it moves [kg], and time step [s].
+    """
+    reach = np.geomspace(nearest, faces.cutoff, 2000)
+    curved = np.abs(np.gradient(faces(reach), reach)) * 4.0 * (STEPPING.every * step) ** 2 / mass
+    near = float(reach[np.flatnonzero(np.append(True, curved[:-1] > STEPPING.stiffness))[-1]])
+    end = STEPPING.fade * near
+    found = Stepping(STEPPING.every, near**2, end**2) if end < faces.cutoff else EACH_STEP
+    near_reach = max([math.sqrt(found.near_end) + 2.0 * tables.lever, *others])
+    return tables._replace(stepping=found, near_reach=near_reach)
 
 
 def _require_poles(study: Study) -> None:

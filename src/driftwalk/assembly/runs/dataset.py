@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.events import ReplayedEvents, replay_contacts, replay_events
+from driftwalk.assembly.lattice.events import replay_contacts, replay_events
 from driftwalk.assembly.lattice.joined_faces import face_table
+from driftwalk.assembly.lattice.many_blocks import ReplayedEvents
 from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
 from driftwalk.assembly.runs.start import bond_attrs, glued_cells
 from driftwalk.core.arrays import Floats

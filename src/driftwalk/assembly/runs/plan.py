@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.lattice.joined_faces import face_table
+from driftwalk.assembly.lattice.joined_faces import ROUNDING, face_table
 from driftwalk.assembly.pull.tables import block_pull, table_of
 from driftwalk.assembly.runs.start import (
     event_rows,
@@ -196,6 +196,40 @@ def whole_steps(study: Study) -> int:
     duration, step = study.assembly.duration_s, study.time_step_s
     require_steps(max(duration, study.forces.force_interval_s), step)
     return max(int(np.floor(duration / step + 1e-9)), 1)
+
+
+def steps_of(
+    duration_s: float, due: float, *, step: float, had: int, otherwise: str = ""
+) -> tuple[int, float]:
+    """Return the whole steps of a duration and of what was due before it, and what is due then [s].
+
+    Parameters
+    ----------
+    duration_s, due : float
+        The duration, and what was left of the ones before it [s].
+    step : float
+        Time step [s].
+    had : int
+        Steps that the world has had.
+    otherwise : str
+        What else helps where they are too many.
+
+    Raises
+    ------
+    InputError
+        When the duration is negative or not finite, or the steps would be too many.
+    """
+    if not 0.0 <= duration_s < math.inf:
+        raise InputError(f"duration_s must be a finite number from 0 s on, got {duration_s}")
+    due += duration_s
+    # Time stamps are decimal numbers: 0.3 s are three steps of 0.1 s.
+    steps = math.floor(min(due / step, 2.0 * MOST_STEPS) + ROUNDING)
+    if had + steps >= MOST_STEPS:
+        raise InputError(
+            f"a world has at most {MOST_STEPS - 1} time steps of {step:g} s and has had {had}: "
+            f"advance by less than {duration_s:g} s{otherwise}"
+        )
+    return steps, due - steps * step
 
 
 def _of_each(name: str, given: npt.ArrayLike | None, default: float, runs: int) -> Floats:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.assembly.outcomes.class_names import class_shapes
+from driftwalk.assembly.outcomes.distribution import at_times
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import Plan
 from driftwalk.assembly.sensitivity.settings import (
@@ -23,6 +24,7 @@ from driftwalk.assembly.sensitivity.settings import (
 )
 from driftwalk.assembly.sensitivity.times import kept_times
 from driftwalk.assembly.yields.local_search import SEARCH, starting_points
+from driftwalk.assembly.yields.selection import Tally
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.files.shards import Arrays
 from driftwalk.schema.shapes import all_single
@@ -153,13 +155,9 @@ class _Simulation:
     def _reached(self, found: Arrays, classes: Sequence[str], plan: Plan) -> Bools:
         hit = np.array([reaches(name, self.target) for name in classes])
         start = hit[list(classes).index(all_single(plan.study.assembly.blocks))]
-        became = found["event_class"].astype(np.int64)
-        history = np.concatenate([np.full((len(became), 1), start), hit[became]], axis=1)
+        became = hit[found["event_class"].astype(np.int64)]
         time = times_of(found["event_step"], time_step=plan.study.time_step_s)
-        run = np.arange(len(became))
-        # NaN, where there is no event, is not before any time.
-        columns = [history[run, (time <= moment).sum(axis=1)] for moment in self.times]
-        return np.stack(columns, axis=1)
+        return at_times(time, became, start, self.times)
 
 
 class Runs:
@@ -190,13 +188,14 @@ class Runs:
         store: Stores | None, executor: Executor | None,
         progress: Callable[[int], None],
     ) -> None:  # fmt: skip
-        self.arms, self._target, self._trial, self._name = arms, target, trial, name
+        self.arms, self.target, self.by, self._trial, self._name = arms, target, by, trial, name
         self._store, self._executor, self._progress = store, executor, progress
         self.times = kept_times(arms.axes.study)
         self._all_times = np.append(self.times, by)
         self._runs: Counter[int] = Counter()
         self._counts: dict[int, Any] = {}
         self.broken = self.done = self._calls = 0
+        self.tally = Tally(self.sample)
 
     def sample(self, arms: Sequence[int], runs: range) -> Bools:
         """Simulate, and return whether each run reached the target in time, shape (arm, run)."""
@@ -205,7 +204,7 @@ class Runs:
         size = settings_per_unit(len(arms) * len(runs), longest, multiple=RUNS_OF_UNIT)
         self._calls += 1
         found = run_sweep(
-            _Simulation(settings, self._target, self._all_times),
+            _Simulation(settings, self.target, self._all_times),
             grid(arm=np.arange(len(arms)), run=np.array(runs)).units(size),
             store=self._own_store([self.arms.points[arm] for arm in arms], len(runs)),
             progress=lambda done, _: self._progress(self.done + done),

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.assembly.outcomes.class_names import target_class
+from driftwalk.assembly.outcomes.distribution import with_limits
 from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS, KEYS, Axes, make_axes
 from driftwalk.assembly.yields.arms import Arms, Ranges, Runs, Stores
 from driftwalk.assembly.yields.local_search import SEARCH, compass_search
-from driftwalk.assembly.yields.selection import SELECTION, Selection, Tally, halving, tell_apart
+from driftwalk.assembly.yields.selection import SELECTION, Selection, halving, tell_apart
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import proportion_interval
 from driftwalk.core.run_stages import Progress
@@ -152,7 +153,7 @@ def maximise_yield(
 
     how: dict[str, Any] = {"store": store, "executor": executor, "progress": told}
     chosen = Runs(arms, name, moment, trial=FIRST_TRIALS.choice, name="choose", **how)
-    tally = Tally(chosen.sample)
+    tally = chosen.tally
     stayed = halving(tally, range(len(arms.points)), runs)
     winner = max(stayed, key=lambda arm: stayed[arm])
     if arms.ranges:
@@ -167,13 +168,14 @@ def maximise_yield(
     )  # fmt: skip
     before = chosen.done
     reported = Runs(arms, name, moment, trial=FIRST_TRIALS.fresh, name="fresh", **how)
-    judge = Tally(reported.sample)
     some = [selected.best, *selected.alike[: YIELD_POLICY.alike], *_front(chosen, known)]
-    judge.extend(list(dict.fromkeys(some)), fresh_runs)
-    found = Found(arms, name, moment, chosen, tally, reported, judge, selected, stayed, runs)
+    reported.tally.extend(list(dict.fromkeys(some)), fresh_runs)
     if progress is not None:
         progress(whole, whole)
-    return yield_dataset(found, indifference=indifference, confidence=confidence)
+    return yield_dataset(
+        chosen, reported, selected, stayed, runs=runs, indifference=indifference,
+        confidence=confidence,
+    )  # fmt: skip
 
 
 def check_yield(
@@ -302,30 +304,19 @@ def _front(chosen: Runs, arms: Sequence[int]) -> list[int]:
     return [arms[at] for at in ranked[: YIELD_POLICY.on_front] if times[at]]
 
 
-class Found(NamedTuple):
-    """The results of search, selection and fresh runs."""
+def yield_dataset(
+    chosen: Runs, reported: Runs, selected: Selection, rounds: Mapping[int, int], *,
+    runs: int, indifference: float, confidence: float,
+) -> xr.Dataset:  # fmt: skip
+    """Return the `yield` dataset; the settings in the order in which they were begun.
 
-    arms: Arms
-    target: str
-    by: float
-    chosen: Runs
-    tally: Tally
-    reported: Runs
-    judge: Tally
-    selected: Selection
-    rounds: dict[int, int]
-    runs: int
-    """Of halving, at most."""
-
-
-def yield_dataset(found: Found, *, indifference: float, confidence: float) -> xr.Dataset:
-    """Return the `yield` dataset; the settings in the order in which they were begun."""
-    arms, tally, judge, selected = found.arms, found.tally, found.judge, found.selected
+    `rounds` are those that each arm stayed in halving, of which there were `runs` at most.
+    """
+    arms, tally, judge = chosen.arms, chosen.tally, reported.tally
     kept = [arm for arm in range(len(arms.points)) if tally.size(arm)]
-    runs, reached = (np.array([one(arm) for arm in kept]) for one in (tally.size, tally.reached))
+    sizes, reached = (np.array([one(arm) for arm in kept]) for one in (tally.size, tally.reached))
     fresh, again = (np.array([one(arm) for arm in kept]) for one in (judge.size, judge.reached))
-    low, high = proportion_interval(again, fresh, confidence=confidence)
-    there = fresh > 0
+    shown = again / np.maximum(fresh, 1), *proportion_interval(again, fresh, confidence=confidence)
     level = (1.0 - confidence) / 2 / max(len(kept) - 1, 1)
     apart = [tally.difference(selected.best, arm) for arm in kept]
     behind = np.array([one.mean for one in apart])
@@ -335,18 +326,14 @@ def yield_dataset(found: Found, *, indifference: float, confidence: float) -> xr
     for arm, word in ((selected.best, "best"), *((arm, "alike") for arm in selected.alike)):
         standing[kept.index(arm)] = word
     data: dict[str, Any] = {
-        "runs": ("setting", runs),
+        "runs": ("setting", sizes),
         "reached": ("setting", reached),
-        "rounds": ("setting", np.array([found.rounds.get(arm, 0) for arm in kept])),
-        "difference": ("setting", behind),
-        "difference_low": ("setting", behind - radius),
-        "difference_high": ("setting", behind + radius),
+        "rounds": ("setting", np.array([rounds.get(arm, 0) for arm in kept])),
+        **with_limits("difference", "setting", behind, behind - radius, behind + radius),
         "standing": ("setting", np.array(standing, dtype=object)),
         "fresh_runs": ("setting", fresh),
-        "fresh_yield": ("setting", np.where(there, again / np.maximum(fresh, 1), np.nan)),
-        "fresh_yield_low": ("setting", np.where(there, low, np.nan)),
-        "fresh_yield_high": ("setting", np.where(there, high, np.nan)),
-        **_over_time(found, kept, confidence),
+        **with_limits("fresh_yield", "setting", *np.where(fresh > 0, shown, np.nan)),
+        **_over_time(chosen, reported, selected.best, kept, confidence),
     }
     for name in arms.points[0]:
         values = [arms.points[arm][name] for arm in kept]
@@ -354,43 +341,42 @@ def yield_dataset(found: Found, *, indifference: float, confidence: float) -> xr
         data[name] = ("setting", np.array(values, dtype=kind))
     study = arms.axes.study
     attrs = {
-        "target": found.target,
-        "by_s": found.by,
+        "target": chosen.target,
+        "by_s": chosen.by,
         "best": kept.index(selected.best),
         "within": selected.within,
         "indifference": indifference,
         "confidence": confidence,
         "searched": ", ".join(arms.ranges),
-        "selection_runs": found.runs,
+        "selection_runs": runs,
         "chosen_runs": tally.runs,
         "reported_runs": judge.runs,
-        "left_out": found.chosen.broken + found.reported.broken,
-        "duration_s": float(found.chosen.times[-1]),
+        "left_out": chosen.broken + reported.broken,
+        "duration_s": float(chosen.times[-1]),
         "seed": study.sensitivity.seed,
         "study": study.to_toml(),
     }
     if "blocks" not in arms.points[0]:
         attrs["blocks"] = study.assembly.blocks
-    return build_dataset("yield", data, {"time": ("time", found.chosen.times)}, attrs)
+    return build_dataset("yield", data, {"time": ("time", chosen.times)}, attrs)
 
 
-def _over_time(found: Found, kept: list[int], confidence: float) -> dict[str, Any]:
+def _over_time(
+    chosen: Runs, reported: Runs, best: int, kept: list[int], confidence: float
+) -> dict[str, Any]:
     """Return the shares over time, and the front: chosen by the first runs, from fresh ones."""
-    fresh = [arm for arm in kept if found.judge.size(arm)]
-    rows = [(found.reported if arm in fresh else found.chosen).share(arm) for arm in kept]
-    best = found.selected.best
+    fresh = [arm for arm in kept if reported.tally.size(arm)]
+    rows = [(reported if arm in fresh else chosen).share(arm) for arm in kept]
     # Where another is better by less than its standard error, the best for the named time stays.
-    seen = [found.chosen.share(a) if a == best else found.chosen.cautious(a) for a in fresh]
+    seen = [chosen.share(arm) if arm == best else chosen.cautious(arm) for arm in fresh]
     ahead = np.array(seen).argmax(axis=0)
     front = np.array([kept.index(arm) for arm in fresh])[ahead]
     share = np.array(rows)
-    runs = found.judge.size(fresh[0])
+    runs = reported.tally.size(fresh[0])
     largest = share[front, np.arange(front.size)]
-    low, high = proportion_interval(np.rint(largest * runs), runs, confidence=confidence)
+    limits = proportion_interval(np.rint(largest * runs), runs, confidence=confidence)
     return {
         "share": (("setting", "time"), share),
         "front_setting": ("time", front),
-        "front_yield": ("time", largest),
-        "front_yield_low": ("time", low),
-        "front_yield_high": ("time", high),
+        **with_limits("front_yield", "time", largest, *limits),
     }
