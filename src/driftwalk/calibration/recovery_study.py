@@ -14,6 +14,7 @@ import numpy as np
 from driftwalk.calibration.estimation.identifiability import DETERMINED
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.intervals import proportion_interval
 from driftwalk.core.random_streams import RecoveryStream, world_keys
 from driftwalk.model import Study
 from driftwalk.schema import Parameter
@@ -168,7 +169,7 @@ def summarise(error: Floats, z: Floats, covered: Floats) -> Summary:
     """
     if error.size == 0:
         return Summary(*[np.nan] * len(Summary._fields))
-    low, high = coverage_interval(int(covered.sum()), covered.size)
+    low, high = proportion_interval(covered.sum(), covered.size, confidence=COVERAGE_CONFIDENCE)
     return Summary(
         median_absolute_error=float(np.median(np.abs(error))),
         absolute_error_90=float(np.quantile(np.abs(error), 0.9)),
@@ -177,28 +178,9 @@ def summarise(error: Floats, z: Floats, covered: Floats) -> Summary:
         spread=float(np.log1p(error).std(ddof=1)) if error.size >= 2 else np.nan,
         rms_z=float(np.sqrt(np.mean(z**2))),
         coverage=float(covered.mean()),
-        coverage_low=low,
-        coverage_high=high,
+        coverage_low=float(low),
+        coverage_high=float(high),
     )
-
-
-def coverage_interval(
-    count: int, total: int, *, confidence: float = COVERAGE_CONFIDENCE
-) -> tuple[float, float]:
-    """Return the Clopper-Pearson interval of a share.
-
-    Examples
-    --------
-    >>> low, high = coverage_interval(0, 10, confidence=0.9)
-    >>> low, round(high, 4)
-    (0.0, 0.2589)
-    """
-    from scipy.special import betaincinv
-
-    tail = 0.5 * (1.0 - confidence)
-    low = float(betaincinv(count, total - count + 1.0, tail)) if count > 0 else 0.0
-    high = float(betaincinv(count + 1.0, total - count, 1.0 - tail)) if count < total else 1.0
-    return low, high
 
 
 def relative_errors(

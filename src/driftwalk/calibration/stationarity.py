@@ -13,7 +13,6 @@ from driftwalk.calibration.problem import Problem
 from driftwalk.comparison import KsReference, block_permutation_test
 from driftwalk.comparison.aspects import points_distance
 from driftwalk.core.arrays import Floats
-from driftwalk.simulation.series import series_warnings
 
 
 class StationarityPolicy(NamedTuple):
@@ -97,16 +96,6 @@ def stationarity_of_motion(motion: RecordedMotion) -> Stationarity | None:
     """Compare the halves of a recording with each other, by the distance of its comparison."""
     steps = motion.steps.points
     return stationarity_of_steps(steps, lambda one, other: points_distance(KsReference(one), other))
-
-
-def motion_warnings(motion: RecordedMotion) -> list[str]:
-    """Return sentences on a recording and its flow.
-
-    Where its halves differ, with the moment at which its speed changed, and where the flow is a
-    series that goes on beyond its frames.
-    """
-    said = series_warnings(motion.like.flow, duration=motion.duration)
-    return [*unsteady_motion(motion), *said]
 
 
 def unsteady_motion(motion: RecordedMotion) -> list[str]:

@@ -162,10 +162,7 @@ def four() -> xr.Dataset:
 def test_a_run_with_more_events_than_there_was_room_is_simulated_again(
     four: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from driftwalk.assembly.runs import run
-
-    for room in (run, plans):
-        monkeypatch.setattr(room, "event_rows", lambda *_, **__: 4)
+    monkeypatch.setattr(plans.Plan, "event_rows", 4)
     again = dw.assemble(
         dw.Study(assembly={"bond_rate_per_s": 0.1}), dw.tank30_flow(), runs=16, duration=60.0
     )

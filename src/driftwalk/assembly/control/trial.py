@@ -24,6 +24,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.intervals import difference_interval, proportion_interval
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import is_one_assembly
 from driftwalk.sweep import Store, grid, run_sweep
@@ -105,7 +106,7 @@ def try_control(
             grid(world=np.arange(begin, begin + worlds)).units(CONTROL_POLICY.unit),
             store=None if store is None else store(name),
             executor=executor,
-            progress=None if progress is None else lambda at, _: progress(before + at, total),
+            progress=lambda at, _: (progress or tell_nobody)(before + at, total),
         )
 
     policys = ran("policy", "policy")

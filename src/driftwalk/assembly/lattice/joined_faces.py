@@ -134,6 +134,12 @@ class Poses(NamedTuple):
         """Where the pose of a block is known."""
         return np.isfinite(self.x) & np.isfinite(self.y) & np.isfinite(self.theta)
 
+    def pair(self, blocks: tuple[int, int], at: Integers) -> PairPoses:
+        """Return two blocks at samples that show both."""
+        i, j = blocks
+        apart = np.stack([values[at, j] - values[at, i] for values in (self.x, self.y)])
+        return PairPoses(self.time[at], apart, self.theta[at][:, blocks].T)
+
 
 def find_joins(poses: Poses, rules: JoinRules) -> list[Join]:
     """Find all joins of a recording, in order of the blocks and of time."""
@@ -190,12 +196,10 @@ def _joins_of_pair(
     poses: Poses, blocks: tuple[int, int], both: Bools, rules: JoinRules
 ) -> list[Join]:
     at = np.flatnonzero(both)
-    i, j = blocks
-    apart = np.stack([values[at, j] - values[at, i] for values in (poses.x, poses.y)])
+    pair = poses.pair(blocks, at)
     # The centres of blocks that fit are hardly farther apart than a side.
-    if not (np.hypot(*apart) <= rules.side + rules.join_distance).any():
+    if not (np.hypot(*pair.apart) <= rules.side + rules.join_distance).any():
         return []
-    pair = PairPoses(poses.time[at], apart, poses.theta[at][:, blocks].T)
     nearest = pair.nearest_faces()
     distance, angle = pair.misfit(nearest, rules.side)
     fits = (distance <= rules.join_distance) & (angle <= rules.join_angle)

@@ -17,7 +17,6 @@ from driftwalk.assembly.lattice.joined_faces import (
     ROUNDING,
     Join,
     JoinRules,
-    PairPoses,
     Poses,
     first_streak,
 )
@@ -59,8 +58,7 @@ class Contact(NamedTuple):
         last = poses.time[min(join.stop, poses.time.size - 1)] + rules.min_duration
         end = int(np.searchsorted(poses.time, last * (1 + ROUNDING), side="right"))
         at = join.start + np.flatnonzero((poses.seen[:, i] & poses.seen[:, j])[join.start : end])
-        apart = np.stack([values[at, j] - values[at, i] for values in (poses.x, poses.y)])
-        pair = PairPoses(poses.time[at], apart, poses.theta[at][:, join.blocks].T)
+        pair = poses.pair(join.blocks, at)
         lie = pair.lie(np.array(join.faces)[:, None], rules.side)
         lie[2] *= rules.side
         return cls(join, at, pair.time, lie, int(np.searchsorted(at, join.stop)))

@@ -40,6 +40,7 @@ from driftwalk.assembly.outcome_posterior.region import (
 )
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS
 from driftwalk.core.arrays import Floats
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.study_keys import INFERRED_KEYS
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import texts
@@ -159,12 +160,10 @@ class _Course:
     def __init__(
         self, problem: OutcomeProblem, store: Any, progress: Progress | None, executor: Any
     ) -> None:
-        self.problem, self.store, self.progress, self.executor = problem, store, progress, executor
-        parameters, policy = len(problem.names), DESIGN_POLICY
-        nodes = policy.first_nodes + policy.rounds * policy.more_nodes
-        self.runs = problem.study.sensitivity.runs
-        checks = problem.truths * len(problem.observed.records)
-        self.total = nodes * parameters * self.runs + checks
+        self.store, self.executor, self.progress = store, executor, progress or tell_nobody
+        nodes = DESIGN_POLICY.first_nodes + DESIGN_POLICY.rounds * DESIGN_POLICY.more_nodes
+        self.checks = problem.truths * len(problem.observed.records)
+        self.total = nodes * len(problem.names) * problem.study.sensitivity.runs + self.checks
         self.done = 0
 
     def simulate(self, name: str, nodes: Nodes) -> list[list[Record]]:
@@ -172,21 +171,18 @@ class _Course:
         each, begun = nodes.study.sensitivity.runs, self.done
         found = nodes.simulate(
             store=None if self.store is None else self.store(name),
-            progress=None
-            if self.progress is None
-            else lambda done, _: self._say(begun + done * each),
+            progress=lambda done, _: self._say(begun + done * each),
             executor=self.executor,
         )
         self.done = begun + each * len(nodes.value)
         return found
 
     def _say(self, done: int) -> None:
-        if self.progress is not None:
-            self.progress(min(done, self.total), self.total)
+        self.progress(min(done, self.total), self.total)
 
     def skip_to_check(self) -> None:
         """Count the rounds that were not needed as done."""
-        self.done = self.total - self.problem.truths * len(self.problem.observed.records)
+        self.done = self.total - self.checks
         self._say(self.done)
 
 
@@ -225,19 +221,14 @@ def _errors(
     problem: OutcomeProblem, emulator: Emulator, categories: Categories, point: Floats
 ) -> tuple[Floats, Floats]:
     """Return the posterior weights of points, and the emulator's relative errors there."""
+    from scipy.special import softmax
+
     own = categories.counts(problem.observed.records)
     mean, variance = emulator.predict(point)
     weight = weights_of(log_likelihoods(mean, variance, own[None])[0])
-    return weight, _relative_error(mean, variance, runs=max(int(own.sum()), 1))
-
-
-def _relative_error(mean: Floats, variance: Floats, *, runs: int) -> Floats:
-    """Return the emulator's error over the sampling error of so many runs, by point."""
-    from scipy.special import softmax
-
-    share = softmax(mean, axis=1)
-    error: Floats = runs * (share * variance).sum(axis=1) / (mean.shape[1] - 1)
-    return error
+    # Over the sampling error of so many runs.
+    runs, share = max(int(own.sum()), 1), softmax(mean, axis=1)
+    return weight, runs * (share * variance).sum(axis=1) / (mean.shape[1] - 1)
 
 
 def _jittered(point: Floats, random: np.random.Generator) -> Floats:

@@ -93,33 +93,30 @@ def principal_components(
     proportion, runs, attrs = _as_proportions(sensitivity_or_proportions, classes)
     table = proportion.values.reshape(-1, proportion.sizes["class"])
     used = np.isfinite(table).all(axis=1)
-    found = _decompose(table[used], components)
-    score = np.full((len(table), found.ratio.size), np.nan)
-    score[used] = found.score
+    mean, own, loading, ratio, variance = _decompose(table[used], components)
+    score = np.full((len(table), ratio.size), np.nan)
+    score[used] = own
     complete = table[used][:, is_complete([str(name) for name in proportion["class"].values])]
-    shape = (*proportion.shape[:-1], found.ratio.size)
+    shape = (*proportion.shape[:-1], ratio.size)
     return build_dataset(
         "components",
         {
             "score": ((*proportion.dims[:-1], "component"), score.reshape(shape)),
-            "loading": (("class", "component"), found.loading),
-            "explained_variance_ratio": ("component", found.ratio),
-            "complete_correlation": (
-                "component",
-                _correlation(found.score, complete.sum(axis=1)),
-            ),
-            "mean": ("class", found.mean),
+            "loading": (("class", "component"), loading),
+            "explained_variance_ratio": ("component", ratio),
+            "complete_correlation": ("component", _correlation(own, complete.sum(axis=1))),
+            "mean": ("class", mean),
         },
         {
             **{str(name): one for name, one in proportion.coords.items()},
-            "component": ("component", np.arange(1, found.ratio.size + 1)),
+            "component": ("component", np.arange(1, ratio.size + 1)),
         },
         {
             **attrs,
             "settings": int(used.sum()),
             "left_out": int((~used).sum()),
-            "total_variance": found.variance,
-            "noise_share": _noise_variance(table[used], runs[used]) / found.variance,
+            "total_variance": variance,
+            "noise_share": _noise_variance(table[used], runs[used]) / variance,
         },
     )
 
@@ -180,14 +177,6 @@ def disconnected_alignment(components: xr.Dataset, *, component: int = 1) -> Ali
     )
 
 
-class _Decomposition(NamedTuple):
-    mean: Floats
-    score: Floats
-    loading: Floats
-    ratio: Floats
-    variance: float
-
-
 def _as_proportions(
     given: xr.Dataset | xr.DataArray | npt.ArrayLike, classes: Sequence[str] | None
 ) -> tuple[xr.DataArray, Floats, dict[str, Any]]:
@@ -237,8 +226,10 @@ def _named_array(values: Floats, classes: Sequence[str] | None) -> xr.DataArray:
     )
 
 
-def _decompose(table: Floats, components: int | None) -> _Decomposition:
-    """Return the decomposition of settings by classes, all of them finite."""
+def _decompose(
+    table: Floats, components: int | None
+) -> tuple[Floats, Floats, Floats, Floats, float]:
+    """Return mean, scores, loadings, ratios and variance of settings by classes, all finite."""
     settings = len(table)
     if settings < 2:
         raise InputError(f"principal components need at least two settings, got {settings}")
@@ -260,13 +251,8 @@ def _decompose(table: Floats, components: int | None) -> _Decomposition:
     sign = np.sign(v[np.arange(kept), np.abs(v).argmax(axis=1)])
     loading = np.zeros((table.shape[1], kept))
     loading[varies] = (v * sign[:, None]).T
-    return _Decomposition(
-        mean=mean,
-        score=u[:, :kept] * size[:kept] * sign,
-        loading=loading,
-        ratio=size[:kept] ** 2 / (size**2).sum(),
-        variance=float((size**2).sum() / (settings - 1)),
-    )
+    score, ratio = u[:, :kept] * size[:kept] * sign, size[:kept] ** 2 / (size**2).sum()
+    return mean, score, loading, ratio, float((size**2).sum() / (settings - 1))
 
 
 def _correlation(score: Floats, complete: Floats) -> Floats:

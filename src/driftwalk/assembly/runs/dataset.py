@@ -181,7 +181,7 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
     return {
         "blocks": settings.blocks,
         "runs": settings.runs,
-        "duration_s": float(np.round(plan.steps * study.time_step_s, DECIMALS)),
+        "duration_s": float(np.round(plan.duration, DECIMALS)),
         "seed": settings.seed,
         "chirality": settings.chirality,
         "latching": settings.latching,
@@ -201,7 +201,7 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
         "trial": plan.trial,
         "backend": plan.backend,
         "study": study.to_toml(),
-        **series_facts(plan.flow, plan.flow_start, duration=plan.steps * study.time_step_s),
+        **series_facts(plan.flow, plan.flow_start, duration=plan.duration),
     }
 
 

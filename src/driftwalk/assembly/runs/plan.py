@@ -14,7 +14,6 @@ from driftwalk import _core
 from driftwalk.assembly.lattice.joined_faces import ROUNDING, face_table
 from driftwalk.assembly.pull.tables import block_pull, table_of
 from driftwalk.assembly.runs.start import (
-    event_rows,
     given_start,
     glued_cells,
     place_blocks,
@@ -73,6 +72,24 @@ class Plan:
     def has_lattice(self) -> bool:
         """Whether the blocks are squares; others have contacts, no faces and no lattice."""
         return self.study.block.has_lattice
+
+    @property
+    def duration(self) -> float:
+        """How long a run is simulated [s]."""
+        return self.steps * self.study.time_step_s
+
+    @property
+    def event_rows(self) -> int:
+        """For how many events a run has room at first: a run with more is simulated again.
+
+        It is what bonds without load make if all blocks are always in one assembly, and half as
+        much.
+        """
+        rules = self.study.assembly
+        least = max(rules.blocks - 1, 1)
+        if not rules.bonds_break:
+            return least
+        return least + 16 + int(6.0 * rules.blocks * rules.bond_rate_per_s * self.duration)
 
     @property
     def chirality(self) -> Chirality | None:
@@ -254,8 +271,7 @@ def simulate_rows(
     plan: Plan, start: Floats, rows: slice = slice(None), *, sample_every: int = 0
 ) -> Arrays:
     """Simulate some of the runs; one entry per run in every array, and room for all events."""
-    rows_of_events = event_rows(plan.study, duration=plan.steps * plan.study.time_step_s)
-    found = _simulate(plan, start, rows, sample_every, rows_of_events)
+    found = _simulate(plan, start, rows, sample_every, plan.event_rows)
     most = int(found["event_count"].max(initial=0))
     if most > found["event_step"].shape[1]:
         found = _simulate(plan, start, rows, sample_every, most)

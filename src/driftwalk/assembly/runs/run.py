@@ -22,7 +22,7 @@ from driftwalk.assembly.runs.draws import (
     has_standard_error,
 )
 from driftwalk.assembly.runs.plan import Backend, Plan, make_plan, simulate_rows, start_poses
-from driftwalk.assembly.runs.start import event_rows, with_event_rows
+from driftwalk.assembly.runs.start import with_event_rows
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
@@ -347,14 +347,8 @@ def _simulate_unit(plan: Plan, poses: Floats, unit: WorkUnit) -> Arrays:
     parts = [
         simulate_rows(drawn, poses, rows) for rows, drawn in _by_draw(plan, unit.start, unit.stop)
     ]
-    rows = _rows(plan)
-    parts = [with_event_rows(part, rows) for part in parts]
+    parts = [with_event_rows(part, plan.event_rows) for part in parts]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def _rows(plan: Plan) -> int:
-    """Return the rows of events of a unit, the same for all of them."""
-    return event_rows(plan.study, duration=plan.steps * plan.study.time_step_s)
 
 
 def _all_events(plan: Plan, poses: Floats, arrays: Arrays) -> Arrays:

@@ -61,18 +61,6 @@ def require_bonds(study: Study) -> None:
         )
 
 
-def event_rows(study: Study, *, duration: float) -> int:
-    """Return for how many events a run has room at first: a run with more is simulated again.
-
-    It is what bonds without load make if all blocks are always in one assembly, and half as much.
-    """
-    rules = study.assembly
-    least = max(rules.blocks - 1, 1)
-    if not rules.bonds_break:
-        return least
-    return least + 16 + int(6.0 * rules.blocks * rules.bond_rate_per_s * duration)
-
-
 def bond_attrs(study: Study) -> dict[str, Any]:
     """Return the attributes that say how bonds break; none where they are permanent."""
     rules = study.assembly

@@ -311,11 +311,10 @@ def simulate_pieces(
     length = [len(piece.runs) for piece in pieces]
     chosen = [piece.setting for piece in pieces]
     together = np.concatenate(keys)
-    duration = plan.steps * plan.study.time_step_s
     filled = replace(
         plan,
         keys=together,
-        flow_start=flow_starts(plan.flow, plan.study, together, duration=duration),
+        flow_start=flow_starts(plan.flow, plan.study, together, duration=plan.duration),
         drag_coefficient=np.repeat(settings.drag_coefficient[chosen], length),
         force_std=np.repeat(settings.force_std[chosen], length),
     )

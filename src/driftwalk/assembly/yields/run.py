@@ -22,7 +22,7 @@ from driftwalk.assembly.yields.local_search import SEARCH, compass_search
 from driftwalk.assembly.yields.selection import SELECTION, Selection, halving, tell_apart
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import proportion_interval
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.run_stages import Progress, tell_nobody
 from driftwalk.schema.check import build_dataset
 from driftwalk.sweep import threads_of_unit
 
@@ -148,8 +148,7 @@ def maximise_yield(
     before = 0
 
     def told(done: int) -> None:
-        if progress is not None:
-            progress(min(before + done, whole), whole)
+        (progress or tell_nobody)(min(before + done, whole), whole)
 
     how: dict[str, Any] = {"store": store, "executor": executor, "progress": told}
     chosen = Runs(arms, name, moment, trial=FIRST_TRIALS.choice, name="choose", **how)
@@ -170,8 +169,7 @@ def maximise_yield(
     reported = Runs(arms, name, moment, trial=FIRST_TRIALS.fresh, name="fresh", **how)
     some = [selected.best, *selected.alike[: YIELD_POLICY.alike], *_front(chosen, known)]
     reported.tally.extend(list(dict.fromkeys(some)), fresh_runs)
-    if progress is not None:
-        progress(whole, whole)
+    told(whole)
     return yield_dataset(
         chosen, reported, selected, stayed, runs=runs, indifference=indifference,
         confidence=confidence,

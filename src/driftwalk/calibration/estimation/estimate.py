@@ -25,7 +25,7 @@ from driftwalk.calibration.estimation.posterior import (
 )
 from driftwalk.calibration.estimation.regression_abc import REGRESSION, Order, sequential_regression
 from driftwalk.calibration.evolution import distinct
-from driftwalk.calibration.held_out.law_findings import MISFIT, Misfit
+from driftwalk.calibration.held_out.law_findings import Misfit
 from driftwalk.core.arrays import Bools, Floats
 
 Starts = Callable[[], Floats]
@@ -73,12 +73,8 @@ class Matched(NamedTuple):
     """In the unit cube."""
     sample: Floats
     """Settings that could have given the recording, shape (draws, parameters)."""
-    discrepancy: float
-    """Sum of squares of the summaries' deviations, in standard deviations."""
-    median_discrepancy: float
-    """Its median over simulated recordings of the model,"""
-    upper_discrepancy: float
-    """and their 95 % quantile."""
+    misfit: Misfit
+    """How far the summaries are from those of the model's own recordings."""
     stretch: float
     """Factor by which the draws are spread for what the model leaves unexplained, from 1 on."""
     even_point: Floats
@@ -92,14 +88,9 @@ class Matched(NamedTuple):
     """and those whose draws still moved when the last simulations were made."""
 
     @property
-    def misfit(self) -> Misfit:
-        """How far the summaries are from those of the model's own recordings."""
-        return Misfit(self.discrepancy, self.upper_discrepancy)
-
-    @property
     def unlike(self) -> bool:
         """Whether the summaries are so far from the model's that it can determine nothing."""
-        far = self.discrepancy > MATCHING.unlike * self.median_discrepancy
+        far = self.misfit.value > MATCHING.unlike * self.misfit.median
         return far and not self.misfit.usual
 
 
@@ -134,19 +125,16 @@ def match_summaries(
     bootstrap = bootstrap_estimates(
         lambda one: objective(one, parts=1)[:, 0], modes.best, replicates
     )
-    best, usual = modes.best, bootstrap.discrepancies
-    middle, most = float(np.median(usual)), float(np.quantile(usual, MISFIT.usual_quantile))
-    discrepancy = best.solution.discrepancy
+    best = modes.best
+    misfit = Misfit.of(best.solution.discrepancy, bootstrap.discrepancies)
     # What the model leaves unexplained widens the draws, as a reduced chi-square above one does.
-    stretch = float(np.sqrt(discrepancy / middle)) if discrepancy > most else 1.0
+    stretch = 1.0 if misfit.usual else float(np.sqrt(misfit.value / misfit.median))
     wider = stretch * bootstrap.spread
     each = [order(_corrected(one.sample, bootstrap.bias, wider)) for one in modes.places]
     return Matched(
         point=np.median(each[0], axis=0),
         sample=modes.mixed(each),
-        discrepancy=discrepancy,
-        median_discrepancy=middle,
-        upper_discrepancy=most,
+        misfit=misfit,
         stretch=stretch,
         even_point=np.clip(best.others[0].setting, 0.0, 1.0),
         profiles=_profiles(order, best, recorded[0], bootstrap.bias, wider),

@@ -300,9 +300,9 @@ def _stages(found: Estimation, entry: Candidate) -> dict[str, Any]:
         data |= {
             "draws": (("draw", "parameter"), _values(entry, matched.sample)),
             "matched_score": ((), found.scores["matched"]),
-            "misfit": ((), matched.discrepancy),
-            "usual_misfit": ((), matched.median_discrepancy),
-            "most_misfit": ((), matched.upper_discrepancy),
+            "misfit": ((), matched.misfit.value),
+            "usual_misfit": ((), matched.misfit.median),
+            "most_misfit": ((), matched.misfit.upper),
             "interval_stretch": ((), matched.stretch),
         }
         if matched.profiles is not None:

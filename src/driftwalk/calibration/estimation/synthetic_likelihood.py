@@ -18,7 +18,7 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.core.arrays import Bools, Floats
 
 Form = Literal["slopes", "squares", "products"]
 FORMS: Final[tuple[Form, ...]] = ("slopes", "squares", "products")
@@ -220,18 +220,13 @@ def _foretold(basis: Floats, summaries: Floats) -> float:
     return float(np.log(spread[used]).mean()) if used.any() else 0.0
 
 
-def _pairs(count: int) -> tuple[Integers, Integers]:
-    first, second = np.triu_indices(count, 1)
-    return first, second
-
-
 def _basis(place: Floats, form: Form) -> Floats:
     """Return 1, each coordinate, and where the form has them, its square and products of two."""
     columns = [np.ones((len(place), 1)), place]
     if form != "slopes":
         columns.append(place**2)
     if form == "products":
-        first, second = _pairs(place.shape[1])
+        first, second = np.triu_indices(place.shape[1], 1)
         columns.append(place[:, first] * place[:, second])
     return np.concatenate(columns, axis=1)
 
@@ -243,7 +238,7 @@ def _basis_slope(place: Floats, form: Form) -> Floats:
     if form != "slopes":
         rows.append(np.diag(2.0 * place))
     if form == "products":
-        first, second = _pairs(count)
+        first, second = np.triu_indices(count, 1)
         mixed = np.zeros((first.size, count))
         at = np.arange(first.size)
         mixed[at, first] = place[second]

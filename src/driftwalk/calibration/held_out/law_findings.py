@@ -20,9 +20,9 @@ from driftwalk.calibration.held_out.held_out_score import (
     HeldOutScore,
     held_out_differences,
 )
-from driftwalk.calibration.held_out.recorded import CHECKS, RecordedMotion
+from driftwalk.calibration.held_out.recorded import CHECKS, RecordedMotion, short_steps
 from driftwalk.calibration.stationarity import unsteady_motion
-from driftwalk.comparison.aspects import AspectPlan, resampled
+from driftwalk.comparison.aspects import AspectPlan
 from driftwalk.core.arrays import Floats
 from driftwalk.core.units import in_percent
 from driftwalk.motion import Worlds
@@ -139,10 +139,7 @@ def _lengths(
 
     Slow is what gets less far than so many levels in so many steps.
     """
-    px, py = resampled(plan.short, x), resampled(plan.short, y)
-    there = np.zeros(px.size - 1, dtype=bool)
-    there[plan.step] = True
-    there &= np.isfinite(np.diff(px)) & np.isfinite(np.diff(py))
+    px, py, there = short_steps(plan, x, y)
     broken = np.concatenate([[0], np.cumsum(~there)])
     length = np.hypot(px[span:] - px[:-span], py[span:] - py[:-span])
     whole = broken[span:] == broken[:-span]
@@ -196,8 +193,16 @@ class Misfit(NamedTuple):
 
     value: float
     """Sum of squares of the summaries' deviations, in standard deviations."""
+    median: float
+    """Its median over the law's own recordings,"""
     upper: float
-    """Its 95 % quantile over the law's own recordings."""
+    """and their 95 % quantile."""
+
+    @classmethod
+    def of(cls, value: float, own: Floats) -> Misfit:
+        """Return the misfit of a recording, from those of the law's own recordings too."""
+        upper = float(np.quantile(own, MISFIT.usual_quantile))
+        return cls(value, float(np.median(own)), upper)
 
     @property
     def usual(self) -> bool:
@@ -214,7 +219,7 @@ class Misfit(NamedTuple):
 
         Examples
         --------
-        >>> Misfit(812.3, 140.2).sentence()
+        >>> Misfit(812.3, 90.1, 140.2).sentence()
         "summaries of the motion: a misfit of 812, that of the model's own recordings is below 140"
         """
         return (

@@ -55,6 +55,16 @@ CHECKS: Final = (*(f"displacement_{lag}" for lag in LAGS), "speed_time", "wall_s
 UNITS: Final = (*("m2" for _ in LAGS), "s", "1", "1")
 
 
+def short_steps(
+    plan: AspectPlan, x: npt.ArrayLike, y: npt.ArrayLike
+) -> tuple[Floats, Floats, Bools]:
+    """Return positions [m] after each short step, and which of the steps between them are there."""
+    px, py = resampled(plan.short, x), resampled(plan.short, y)
+    there = np.zeros(px.size - 1, dtype=bool)
+    there[plan.step] = True
+    return px, py, there & np.isfinite(np.diff(px)) & np.isfinite(np.diff(py))
+
+
 def motion_checks(
     plan: AspectPlan,
     x: npt.ArrayLike,
@@ -65,10 +75,7 @@ def motion_checks(
     usual_step: float,
 ) -> Floats:
     """Return facts of a motion, shape (checks,); NaN where it is too short for one."""
-    px, py = resampled(plan.short, x), resampled(plan.short, y)
-    there = np.zeros(px.size - 1, dtype=bool)
-    there[plan.step] = True
-    there &= np.isfinite(np.diff(px)) & np.isfinite(np.diff(py))
+    px, py, there = short_steps(plan, x, y)
     broken = np.concatenate([[0], np.cumsum(~there)])
     length = np.hypot(np.diff(px), np.diff(py))
     found = [_squared_displacement(px, py, broken, lag) for lag in LAGS]

@@ -26,7 +26,7 @@ from driftwalk.calibration.held_out.held_out_score import (
     held_out_differences,
     score_setting,
 )
-from driftwalk.calibration.held_out.law_findings import MISFIT, BoutDistance, Misfit, bout_distances
+from driftwalk.calibration.held_out.law_findings import BoutDistance, Misfit, bout_distances
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
@@ -64,23 +64,14 @@ EVIDENCE: Final = EvidencePolicy()
 class Evidence(NamedTuple):
     """The summaries of the motion, as one model gives them."""
 
-    discrepancy: float
-    """Sum of squares of the summaries' deviations, in standard deviations."""
-    median_discrepancy: float
-    """Its median over simulated recordings of the model,"""
-    upper_discrepancy: float
-    """and their 95 % quantile."""
+    misfit: Misfit
+    """How far the summaries are from those of the model's own recordings."""
     deviance: float
     """-2 log of the evidence, but for a constant that all models share."""
     matched: HeldOutScore | None = None
     """The setting of the summaries, judged as that of the distances; where these are usual."""
     bouts: tuple[BoutDistance, ...] = ()
     """How long bouts last there, against the model's own recordings."""
-
-    @property
-    def misfit(self) -> Misfit:
-        """How far the summaries are from those of the model's own recordings."""
-        return Misfit(self.discrepancy, self.upper_discrepancy)
 
 
 class EvidenceRanking(NamedTuple):
@@ -175,17 +166,17 @@ def ranking_sentence(
     names: Sequence[str], evidence: Mapping[int, Evidence], answer: EvidenceRanking
 ) -> str:
     """Return what the summaries of the motion say, in a sentence."""
-    discrepancies = {k: f"{names[k]} {one.discrepancy:.0f}" for k, one in evidence.items()}
+    discrepancies = {k: f"{names[k]} {one.misfit.value:.0f}" for k, one in evidence.items()}
     if answer.best is None:
         return (
             "No model reproduces the summaries of the motion: the misfits are "
             f"{', '.join(discrepancies.values())}, those of the models' own recordings below "
-            f"{max(one.upper_discrepancy for one in evidence.values()):.0f}"
+            f"{max(one.misfit.upper for one in evidence.values()):.0f}"
         )
-    best = evidence[answer.best]
+    best = evidence[answer.best].misfit
     sentence = (
         f"{names[answer.best]} is named by the summaries of the motion: a misfit of "
-        f"{best.discrepancy:.0f}, that of its own recordings is below {best.upper_discrepancy:.0f}"
+        f"{best.value:.0f}, that of its own recordings is below {best.upper:.0f}"
     )
     if answer.rivals:
         rivals = ", ".join(names[k] for k in answer.rivals)
@@ -242,9 +233,7 @@ def estimate_evidence(
         lambda settings: simulate(settings)[:, 0], objective.recorded[0], setting, replicates
     )
     evidence = Evidence(
-        discrepancy=found.discrepancy,
-        median_discrepancy=float(np.median(found.own_discrepancies)),
-        upper_discrepancy=float(np.quantile(found.own_discrepancies, MISFIT.usual_quantile)),
+        misfit=Misfit.of(found.discrepancy, found.own_discrepancies),
         # Laplace's approximation, with a prior that is even over the ranges.
         deviance=found.discrepancy
         + found.log_variance

@@ -24,7 +24,7 @@ from driftwalk.calibration.ranking.model_evidence import (
     ranking_sentence,
     with_matched_settings,
 )
-from driftwalk.calibration.stationarity import motion_warnings, stationarity_of_motion
+from driftwalk.calibration.stationarity import stationarity_of_motion, unsteady_motion
 from driftwalk.core.arrays import Floats
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.answers.verdict import (
@@ -35,6 +35,7 @@ from driftwalk.schema.answers.verdict import (
     verdict_of,
 )
 from driftwalk.schema.check import build_dataset
+from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,7 +75,8 @@ def build_comparison(
         for name, entry, one in zip(names, entries, held_out, strict=True)
         if (text := entry.at_range_end(one.point)) is not None
     ]
-    said = [*warnings, *ended, *motion_warnings(motion)]
+    series = series_warnings(motion.like.flow, duration=motion.duration)
+    warned = [*warnings, *ended, *unsteady_motion(motion), *series]
     why = _findings(names, entries, verdicts, closest, tied)
     if evidence:
         why.insert(0 if answer.best is not None else 1, ranking_sentence(names, evidence, answer))
@@ -108,7 +110,7 @@ def build_comparison(
         **about.coords,
         "parameter": ("parameter", texts(list(units))),
         "finding": ("finding", texts(findings)),
-        "warning": ("warning", texts(said)),
+        "warning": ("warning", texts(warned)),
     }
     attrs = dict(about.attrs)
     if stationarity is not None:
@@ -125,9 +127,10 @@ def _summaries(models: int, evidence: Mapping[int, Evidence], best: int | None) 
         "asked": ("model", [k in evidence for k in range(models)]),
         "named": ("model", [k == best for k in range(models)]),
     }
+    said = {k: (*one.misfit, one.deviance) for k, one in evidence.items()}
     stored = ("misfit", "usual_misfit", "most_misfit", "unlikely")
     for place, name in enumerate(stored):
-        values = [evidence[k][place] if k in evidence else np.nan for k in range(models)]
+        values = [said[k][place] if k in said else np.nan for k in range(models)]
         data[name] = ("model", values)
     return data
 

@@ -95,9 +95,9 @@ def test_a_recording_of_the_model_is_matched_by_its_summaries_alone():
     assert (np.abs(found.point - TRUTH) < 0.6 * std).all()
     assert (np.abs(found.even_point - EVEN) < 0.6 * std).all()
     np.testing.assert_allclose(found.sample.std(axis=0), std, rtol=0.25)
-    assert found.median_discrepancy == pytest.approx(chi2(4).median(), abs=1.1)
-    assert found.upper_discrepancy == pytest.approx(chi2(4).ppf(0.95), abs=4.0)
-    assert found.discrepancy < MATCHING.matches * SPREAD.size
+    assert found.misfit.median == pytest.approx(chi2(4).median(), abs=1.1)
+    assert found.misfit.upper == pytest.approx(chi2(4).ppf(0.95), abs=4.0)
+    assert found.misfit.value < MATCHING.matches * SPREAD.size
 
 
 @pytest.mark.slow
@@ -107,8 +107,8 @@ def test_what_the_model_cannot_give_widens_the_draws():
     found = matched(Toy(bent, 2, off=10.0), starts)
     assert starts.calls == 1
     assert not found.misfit.usual
-    assert MATCHING.matches * SPREAD.size < found.discrepancy < MATCHING.hopeless * SPREAD.size
-    assert found.stretch == pytest.approx(np.sqrt(found.discrepancy / found.median_discrepancy))
+    assert MATCHING.matches * SPREAD.size < found.misfit.value < MATCHING.hopeless * SPREAD.size
+    assert found.stretch == pytest.approx(np.sqrt(found.misfit.value / found.misfit.median))
     assert found.stretch > 2.0
     assert found.unlike
     np.testing.assert_allclose(found.sample.std(axis=0), found.stretch * deviations(), rtol=0.35)
@@ -119,7 +119,7 @@ def test_what_the_model_cannot_give_widens_the_draws():
 def test_a_small_misfit_leaves_parameters_determined():
     """One summary is three deviations off, 9 of misfit beside the usual 3.4 of 4 degrees."""
     found = matched(Toy(bent, 2, off=3.0), Starts((0.4, 0.6)), replicates=200)
-    assert 1.0 < found.discrepancy / found.median_discrepancy < 4.0
+    assert 1.0 < found.misfit.value / found.misfit.median < 4.0
     assert not found.unlike
 
 
@@ -128,7 +128,7 @@ def test_another_start_is_no_use_for_another_model():
     starts = Starts((0.4, 0.6))
     found = matched(Toy(bent, 3, off=300.0), starts)
     assert starts.calls == 0
-    assert found.discrepancy > MATCHING.hopeless * SPREAD.size
+    assert found.misfit.value > MATCHING.hopeless * SPREAD.size
     assert not found.misfit.usual
     assert ((found.sample >= 0.0) & (found.sample <= 1.0)).all()
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from driftwalk.calibration.held_out.law_findings import Misfit
 from driftwalk.calibration.problem import in_memory
 from driftwalk.calibration.ranking import compare
 from driftwalk.calibration.ranking.compare import Stages
@@ -32,7 +33,7 @@ def test_others_than_those_that_tie_are_asked_until_one_gives_the_summaries(
     order, numbers = ((3, 0, 2), [5] * 4) if wanted[0] == 3 else ((1, 0, 2), [7, 6, 5, 5])
 
     def answer(entry: int, *_: Any, **__: Any) -> Evidence:
-        return Evidence(100.0 if entry in giving else 500.0, 90.0, 140.0, 0.0)
+        return Evidence(Misfit(100.0 if entry in giving else 500.0, 90.0, 140.0), 0.0)
 
     monkeypatch.setattr(compare, "shortlist_models", lambda *_: Shortlist(order, tied))
     monkeypatch.setattr(compare, "most_settings", lambda *_: 4)
@@ -58,5 +59,5 @@ def test_a_walk_that_the_distances_do_not_reject_is_asked_where_a_model_gives_th
     misfit = 100.0 if reproduced else 500.0
     monkeypatch.setattr(compare, "shortlist_models", lambda *_: Shortlist((0,), 1))
     monkeypatch.setattr(compare, "held_out_differences", lambda one, _: rejected[one.number])
-    monkeypatch.setattr(Stages, "_matched", lambda *_: Evidence(misfit, 90.0, 140.0, 0.0))
+    monkeypatch.setattr(Stages, "_matched", lambda *_: Evidence(Misfit(misfit, 90.0, 140.0), 0.0))
     assert list(Stages(work, 20, in_memory, None, lambda *_: None).evidence(judged)) == wanted

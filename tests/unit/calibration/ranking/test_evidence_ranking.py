@@ -10,6 +10,7 @@ import pytest
 
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore, without_error
+from driftwalk.calibration.held_out.law_findings import Misfit
 from driftwalk.calibration.ranking.model_evidence import (
     EVIDENCE,
     Evidence,
@@ -79,7 +80,7 @@ def test_a_walk_is_never_named() -> None:
 
 
 def said(discrepancy: float, deviance: float) -> Evidence:
-    return Evidence(discrepancy, 100.0, 140.0, deviance)
+    return Evidence(Misfit(discrepancy, 100.0, 140.0), deviance)
 
 
 ENTRIES = [entry(9), entry(3), entry(12)]
