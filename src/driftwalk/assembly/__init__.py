@@ -44,7 +44,7 @@ from driftwalk.assembly.outcomes.l1 import (
 from driftwalk.assembly.outcomes.sizes import assembly_sizes
 from driftwalk.assembly.outcomes.steady_state import rate_interval, steady_state
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
-from driftwalk.assembly.pull.attraction import attraction
+from driftwalk.assembly.pull.tables import attraction
 from driftwalk.assembly.recordings import classify
 from driftwalk.assembly.runs.dataset import path_recording
 from driftwalk.assembly.runs.draws import draw_parameters, has_uncertainty, interaction_quantiles

@@ -18,6 +18,7 @@ from driftwalk.assembly.outcomes.class_names import overlap_depth
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
+from driftwalk.flow.arena import outline_of
 from driftwalk.schema import FLAGS, check_flow_field
 from driftwalk.schema.shapes import cells_of_shape
 from driftwalk.simulation.backend import wall_edges
@@ -320,7 +321,7 @@ def require_cover(flow: xr.Dataset, tank: Tank) -> None:
     check_flow_field(flow)
     x, y = (flow[name].values.astype(np.float64) for name in ("x", "y"))
     cells = tuple((nodes[-1] - nodes[0]) / (nodes.size - 1) for nodes in (x, y))
-    low, high = bounding_box(tank)
+    low, high = np.split(np.array(outline_of(tank.to_arena()).bounds), 2)
     for nodes, cell, begin, end in zip((x, y), cells, low, high, strict=True):
         if nodes[0] - cell > begin + 1e-9 or nodes[-1] + cell < end - 1e-9:
             raise InputError(
@@ -341,14 +342,6 @@ def require_cover(flow: xr.Dataset, tank: Tank) -> None:
             "was made for; give the field of this tank, or the tank of this field "
             "(`tank.diameter_m`, [tank])"
         )
-
-
-def bounding_box(tank: Tank) -> tuple[Floats, Floats]:
-    """Return the lower and the upper corner of the tank's bounding box [m]."""
-    if tank.radius_m is not None:
-        return np.full(2, -tank.radius_m), np.full(2, tank.radius_m)
-    corners = np.asarray(tank.corners_m)
-    return corners.min(axis=0), corners.max(axis=0)
 
 
 def inward_depth(tank: Tank, x: Floats, y: Floats) -> Floats:

@@ -113,7 +113,8 @@ def sensitivity_map(
     {'latching': 2, 'class': 2}
     """
     chosen = make_axes(study, axes)
-    settings = _map_settings(chosen, flow, threads_of_unit(threads, executor))
+    each = threads_of_unit(threads, executor)
+    settings = chosen.settings(flow, first_trial=FIRST_TRIALS.map, threads=each)
     if reference is None:
         reference = sensitivity_reference(chosen.study, flow, threads=threads, executor=executor)
     outcomes = simulate_settings(settings, store=store, progress=progress, executor=executor)
@@ -202,14 +203,10 @@ def check_sensitivity(
     961
     """
     chosen = make_axes(study, axes)
-    settings = _map_settings(chosen, flow, threads)
+    settings = chosen.settings(flow, first_trial=FIRST_TRIALS.map, threads=threads)
     place_first(settings)
     place_first(_reference_settings(chosen.study, flow, threads))
     return settings.size
-
-
-def _map_settings(axes: Axes, flow: xr.Dataset, threads: int | None) -> Settings:
-    return axes.settings(flow, first_trial=FIRST_TRIALS.map, threads=threads)
 
 
 def _reference_settings(study: Study, flow: xr.Dataset, threads: int | None) -> Settings:
