@@ -294,7 +294,6 @@ def _rates(
             kind,
             [len(one) for one in moments],
             clock[-1],
-            dim="class",
             confidence=RATE_CONFIDENCE,
             clusters=clusters,
         )

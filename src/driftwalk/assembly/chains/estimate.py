@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,18 +21,8 @@ from driftwalk.assembly.chains.hidden import (
     passage,
     shares,
 )
-from driftwalk.assembly.chains.histories import (
-    Histories,
-    blocks_of,
-    datasets_of,
-    histories,
-)
-from driftwalk.assembly.chains.mixing import (
-    WELL_MIXED,
-    equal_rates,
-    judge_mixing,
-    needed_events,
-)
+from driftwalk.assembly.chains.histories import Histories, blocks_of, datasets_of, histories
+from driftwalk.assembly.chains.mixing import WELL_MIXED, equal_rates, judge_mixing, needed_events
 from driftwalk.assembly.outcomes.class_names import sort_classes
 from driftwalk.assembly.outcomes.distribution import with_limits
 from driftwalk.assembly.outcomes.steady_state import PARTS, clustering, rate_interval
@@ -149,7 +140,9 @@ def kinetics(
     folds, replicates = KINETICS_POLICY.folds, KINETICS_POLICY.replicates
     whole = len(FORMS) * folds + replicates
 
-    def swept(name: str, function: HeldOut | Replicate, design: Design, begun: int) -> Arrays:
+    def swept(
+        name: str, function: Callable[[WorkUnit], Arrays], design: Design, begun: int
+    ) -> Arrays:
         return run_sweep(
             function,
             design.units(1),
@@ -159,7 +152,7 @@ def kinetics(
         )
 
     models = grid(model=np.arange(len(FORMS)), fold=np.arange(folds))
-    scored = swept("held_out", HeldOut(found), models, 0)
+    scored = swept("held_out", partial(_held_out, found), models, 0)
     scores = np.nansum(scored["score"].reshape(len(FORMS), folds, -1), axis=1)
     best = int(scores.mean(axis=1).argmax())
     behind = scores - scores[best]
@@ -289,20 +282,13 @@ def _enough(found: Histories) -> None:
     )
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """Held-out log likelihoods, NaN of the runs of other folds; a work unit is a model and fold."""
-
-    found: Histories
-
-    def __call__(self, unit: WorkUnit) -> dict[str, Floats]:
-        """Return the scores of a unit, shape (1, run)."""
-        [at], [fold] = (unit.settings[name] for name in ("model", "fold"))
-        out = np.arange(self.found.runs) % KINETICS_POLICY.folds == int(fold)
-        score = np.full((1, self.found.runs), np.nan)
-        model = _trained(self.found, FORMS[int(at)], ~out)
-        score[0, out] = log_likelihood(self.found.of(out), model)
-        return {"score": score}
+def _held_out(found: Histories, unit: WorkUnit) -> Arrays:
+    """Return the held-out log likelihoods of a model and fold, (1, run); NaN of other folds."""
+    [at], [fold] = (unit.settings[name] for name in ("model", "fold"))
+    out = np.arange(found.runs) % KINETICS_POLICY.folds == int(fold)
+    score = np.full((1, found.runs), np.nan)
+    score[0, out] = log_likelihood(found.of(out), _trained(found, FORMS[int(at)], ~out))
+    return {"score": score}
 
 
 def _trained(found: Histories, form: Form, kept: Any) -> Model:

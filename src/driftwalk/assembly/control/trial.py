@@ -87,6 +87,8 @@ def try_control(
     --------
     ``try_control(policy, worlds=2000)["reached"]``
     """
+    from scipy.stats import norm
+
     rules, modes = stored_rules(policy), stored_modes(policy)
     wanted = trial_setting(policy, worlds, latency, missed, force_factor)
     classes = tuple(str(name) for name in policy["class"].values)
@@ -120,7 +122,10 @@ def try_control(
     share = CONTROL_POLICY.confidence
     reached = hits[:, :, -1]
     low, high = proportion_interval(reached.sum(axis=1), worlds, confidence=share)
-    gain, half = _paired(reached[0] - reached, share)
+    # The arms run in the same worlds: what counts is the spread of their differences.
+    apart = reached[0] - reached
+    gain = apart.mean(axis=1)
+    half = norm.ppf(0.5 + 0.5 * share) * (apart.std(axis=1, ddof=1) / np.sqrt(worlds))
     whole = np.array([is_one_assembly(name) for name in classes])
     example = _example(policys, target)
     stated, planned = float(policy.attrs["reached"]), int(policy.attrs["worlds"])
@@ -242,14 +247,6 @@ def trial_setting(
     if not 0.0 < force_factor < np.inf:
         raise InputError(f"the factor on sigma_F has to be above 0, got {force_factor:g}")
     return wanted
-
-
-def _paired(difference: Floats, confidence: float) -> tuple[Floats, Floats]:
-    """Return means of differences in the same worlds, and half of their intervals."""
-    from scipy.stats import norm
-
-    error = difference.std(axis=1, ddof=1) / np.sqrt(difference.shape[1])
-    return difference.mean(axis=1), norm.ppf(0.5 + 0.5 * confidence) * error
 
 
 def _usage(found: Arrays, left_out: Any, modes: int) -> Floats:

@@ -308,9 +308,10 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
     seen = observed / max(observed.sum(), 1)
     most = int(np.argmax(np.abs(seen - predicted)))
     worst = names[most] if names[most] == "rest" else short_class(names[most])
+    first, _, last = intervals_of(emulated.point, weight).T
     unlike = (
         "widen the ranges, or the model is wrong"
-        if not explained and _at_edge(intervals_of(emulated.point, weight)).any()
+        if not explained and ((first < policy.edge) | (last > 1.0 - policy.edge)).any()
         else f"most in {worst}, {seen[most]:.3f} seen and {predicted[most]:.3f} predicted"
     )
     unit = [_unit(name) for name in problem.names]
@@ -412,12 +413,6 @@ def limits_of(ends: Floats) -> npt.NDArray[Any]:
     narrow = (high - low) / policy.confidence < policy.prior_like
     sides = [~narrow, low < policy.edge, high > 1.0 - policy.edge]
     return np.select(sides, [NO_END, UPPER_END, LOWER_END], BOTH_ENDS)
-
-
-def _at_edge(ends: Floats) -> npt.NDArray[np.bool_]:
-    """Return which intervals reach an end of their range."""
-    edge = REGION_POLICY.edge
-    return np.asarray((ends[:, 0] < edge) | (ends[:, 2] > 1.0 - edge))
 
 
 def _reasons(

@@ -120,9 +120,7 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
     for name, kind in (("joining", JOINING), ("parting", PARTING)):
         count = np.bincount(stays.state[stays.ends_by == kind], minlength=len(names))
         clusters = _clusters(stays, time, runs, confidence) if kind == JOINING else 1.0
-        data |= rate_variables(
-            name, count, time, dim="class", confidence=confidence, clusters=clusters
-        )
+        data |= rate_variables(name, count, time, confidence=confidence, clusters=clusters)
     age, curves = _lifetimes(stays, len(names), confidence)
     return build_dataset(
         "steady_state",
@@ -354,7 +352,6 @@ def rate_variables(
     count: npt.ArrayLike,
     time: npt.ArrayLike,
     *,
-    dim: str,
     confidence: float,
     clusters: npt.ArrayLike = 1.0,
 ) -> dict[str, Any]:
@@ -366,8 +363,6 @@ def rate_variables(
         Of the rate: ``joining`` gives ``joining_count``, ``joining_rate``, ...
     count, time, confidence
         As in `rate_interval`, one entry per class.
-    dim : str
-        The dimension of the classes.
     clusters : array_like
         By how much events cluster: the interval is that of so many times fewer in less time.
     """
@@ -376,6 +371,6 @@ def rate_variables(
     low, high = rate_interval(number * fewer, span * fewer, confidence=confidence)
     rate = np.divide(number, span, out=np.full(span.shape, np.nan), where=span > 0)
     return {
-        f"{name}_count": (dim, number.astype(np.int64)),
-        **with_limits(f"{name}_rate", dim, rate, low, high),
+        f"{name}_count": ("class", number.astype(np.int64)),
+        **with_limits(f"{name}_rate", "class", rate, low, high),
     }

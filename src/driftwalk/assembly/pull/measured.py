@@ -77,14 +77,16 @@ class MeasuredAttraction:
         between = values[row - 1] + share * (values[row] - values[row - 1])
         return np.insert(gaps, row, gap), np.insert(values, row, between, axis=0)
 
+    def _at_gaps(self, gaps: Floats, values: Floats) -> MeasuredAttraction:
+        axes = tuple(gaps.tolist()), *self.axes[1:]
+        return replace(self, axes=axes, force=tuple(values.ravel().tolist()))
+
     def flat_below(self, gap: float) -> MeasuredAttraction:
         """Return the table with the force of this gap [m] at all below it."""
         gaps, values = self._with_gap(gap)
         row = int(np.searchsorted(gaps, gap))
         values = np.concatenate([np.repeat(values[row : row + 1], row, axis=0), values[row:]])
-        return replace(
-            self, axes=(tuple(gaps.tolist()), *self.axes[1:]), force=tuple(values.ravel().tolist())
-        )
+        return self._at_gaps(gaps, values)
 
     def up_to(self, gap: float) -> MeasuredAttraction:
         """Return the part of the table up to this gap [m].
@@ -101,11 +103,7 @@ class MeasuredAttraction:
             )
         gaps, values = self._with_gap(gap)
         kept = gaps <= gap
-        return replace(
-            self,
-            axes=(tuple(gaps[kept].tolist()), *self.axes[1:]),
-            force=tuple(values[kept].ravel().tolist()),
-        )
+        return self._at_gaps(gaps[kept], values[kept])
 
     def energies(self) -> Floats:
         """Return the energy at the nodes [J]: the force integrated from the largest gap inward."""

@@ -228,15 +228,6 @@ class Misfit(NamedTuple):
         )
 
 
-class Findings(NamedTuple):
-    """Findings of a recording on a law."""
-
-    against: list[str]
-    """Where it differs, the worst first."""
-    unable: list[str]
-    """Which tests could not tell, with what would be needed."""
-
-
 def law_findings(
     entry: Candidate,
     held_out: HeldOutScore,
@@ -244,7 +235,7 @@ def law_findings(
     *,
     misfit: Misfit | None,
     bouts: Sequence[BoutDistance] = (),
-) -> Findings:
+) -> tuple[list[str], list[str]]:
     """Return what a recording says of a law.
 
     Against it are the aspects and facts of the odd blocks that it misses, a misfit of the summaries
@@ -295,8 +286,8 @@ def law_findings(
             f"the body was at the wall for {in_percent(share, decimals=1)} of the time: how it "
             "moves away from it was hardly recorded; record it in a larger tank",
         )
-        return Findings([], [*unable, *against])
-    return Findings(against, unable)
+        return [], [*unable, *against]
+    return against, unable
 
 
 def _wall_limit(motion: RecordedMotion) -> float:

@@ -61,24 +61,6 @@ def runs_in_threads(entry: Candidate) -> bool:
     return entry.baseline or isinstance(entry.model, BlockModel | ParticleModel)
 
 
-def longest_first(places: Sequence[int], entries: Sequence[Candidate]) -> list[int]:
-    """Return places of models so that none is left over for one processor at the end.
-
-    The block takes more steps of time than the others, which take the longer the more they have to
-    search.
-    """
-    return sorted(
-        places,
-        key=lambda k: (not isinstance(entries[k].model, BlockModel), -len(entries[k].ranges)),
-    )
-
-
-def with_thread_share(entry: Candidate, count: int) -> Candidate:
-    """Return a model with its share of the threads, where so many are searched at a time."""
-    each = max(entry.like.threads // max(count, 1), 1)
-    return entry._replace(like=replace(entry.like, threads=each))
-
-
 @contextmanager
 def thread_pool(count: int) -> Iterator[ThreadPoolExecutor | None]:
     """Give threads for several models; none where there is one processor.
@@ -299,12 +281,24 @@ class Stages:
         )
         others = [k for k in missing if k not in threaded]
         alone = replace(self.work, within=together)
-        shared = replace(alone, entries=[with_thread_share(one, len(threaded)) for one in entries])
+        share = max(len(threaded), 1)
+        shared = replace(
+            alone,
+            entries=[
+                one._replace(like=replace(one.like, threads=max(one.like.threads // share, 1)))
+                for one in entries
+            ],
+        )
+        # The block takes more steps of time than the others, which take the longer the more they
+        # have to search: so none is left over for one processor at the end.
+        threaded.sort(
+            key=lambda k: (not isinstance(entries[k].model, BlockModel), -len(entries[k].ranges))
+        )
         with together.cancellation:
             if others:
                 run_sweep(alone, [units[k] for k in others], store=retained, progress=look)
             if threaded:
-                first = [units[k] for k in longest_first(threaded, entries)]
+                first = [units[k] for k in threaded]
                 run_sweep(shared, first, store=retained, executor=self.pool, progress=look)
         return collect(retained, units)
 
