@@ -132,7 +132,7 @@ def replay_contacts(
     pose : ndarray, shape (runs, blocks, 2 or more)
         Columns x and y at the end [m]; of rectangles the third is theta [rad].
     diameter, width
-        As in `driftwalk.assembly.outcomes.components.touching`.
+        As in `driftwalk.assembly.outcomes.class_names.touching`.
 
     Raises
     ------
