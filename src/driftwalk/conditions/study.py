@@ -66,8 +66,8 @@ def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> Non
     """Refuse a tank that does not hold the recorded positions.
 
     The camera's noise shows a body at the wall beyond it: by four standard deviations at most, of
-    the study's noise or of the one that is estimated (`driftwalk.record.noise_reach`). A simulated
-    recording in its own tank is not looked at: the body kept to it.
+    the study's noise or of the one that is estimated (`noise_reach` of `schema.tracker_errors`). A
+    simulated recording in its own tank is not looked at: the body kept to it.
 
     Parameters
     ----------

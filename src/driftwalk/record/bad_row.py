@@ -41,15 +41,10 @@ def check_lines(block: bytes, layout: TableLayout, *, line: int, decimal: str = 
             fields = fields[:expected]
         if len(fields) != expected:
             commas = layout.delimiter == "," and len(fields) > 1 and "." not in text
-            hint = (
-                " (if decimals are written with a comma, save them with a point)" if commas else ""
-            )
-            raise FormatError(
-                f"expected {expected} fields separated by "
-                f"{DELIMITER_NAMES.get(layout.delimiter, repr(layout.delimiter))}, "
-                f"got {len(fields)}{hint}",
-                line=number,
-            )
+            hint = " (if decimals are written with a comma, save them with a point)"
+            between = DELIMITER_NAMES.get(layout.delimiter, repr(layout.delimiter))
+            what = f"expected {expected} fields separated by {between}, got {len(fields)}"
+            raise FormatError(what + hint if commas else what, line=number)
         for column in layout.numbers:
             value = fields[column]
             if value not in MISSING and not is_number(value, decimal=decimal):

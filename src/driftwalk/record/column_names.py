@@ -65,14 +65,11 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     if stamp is not None:
         return stamp
     index, quantity, number = _quantity(tokens[:-1] if last in UNITS or last in NO_UNIT else tokens)
-    if (
-        not inside
-        and quantity
-        and (last in ALLOWED[quantity] or UNITS.get(last) in ALLOWED[quantity])
-    ):
+    units = ALLOWED[quantity] if quantity and not inside else None
+    if units is not None and (last in units or UNITS.get(last) in units):
         unit = UNITS[tokens.pop().lower()]
-    elif not inside and quantity and (last in NO_UNIT or _scaled(last) in ALLOWED[quantity]):
-        unknown = tokens.pop() if ALLOWED[quantity] else ""
+    elif units is not None and (last in NO_UNIT or _scaled(last) in units):
+        unknown = tokens.pop() if units else ""
     else:
         index, quantity, number = _quantity(tokens)
     if not quantity:

@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from driftwalk.core.errors import InputError, argument_text
-from driftwalk.record.circle import implied_scale
+from driftwalk.record.arena import implied_scale
 from driftwalk.record.cleaning.clock import CLOCK
 from driftwalk.record.cleaning.warn import refuse_far, span_of
 from driftwalk.record.raw import (
@@ -49,8 +49,7 @@ def detect_quantum(values: Array) -> float:
     if known.size < 2:
         return 0.0
     decimal = _decimal_quantum(known)
-    coarse = _lattice_quantum(known, decimal)
-    return coarse if coarse > 0.0 else decimal
+    return _lattice_quantum(known, decimal) or decimal
 
 
 def _decimal_quantum(values: Array) -> float:
@@ -87,9 +86,8 @@ def _lattice_quantum(values: Array, decimal: float) -> float:
     regular = float((np.abs(steps - multiples * spacing) <= tolerance).mean())
     # Every recording has a smallest step; a lattice has hardly any other, and far more samples
     # than sites.
-    few_sites = (
-        distinct.size < 0.5 * values.size or np.ptp(distinct) / spacing < 4.0 * distinct.size
-    )
+    sites = np.ptp(distinct) / spacing
+    few_sites = distinct.size < 0.5 * values.size or sites < 4.0 * distinct.size
     return spacing if regular > 0.99 and few_sites and spacing > 3.0 * decimal else 0.0
 
 

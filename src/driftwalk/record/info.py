@@ -10,7 +10,7 @@ import numpy as np
 from driftwalk.core.arrays import Bools
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text.json_text import json_value, parse_json
-from driftwalk.record.circle import fit_circle
+from driftwalk.record.arena import fit_circle
 from driftwalk.record.raw import Array
 from driftwalk.schema import Track, body_names, body_track, check_trajectory
 from driftwalk.schema.tracker_errors import estimate_tracking_noise
@@ -89,7 +89,6 @@ def _json_attribute(attrs: dict[Any, Any], name: str, default: Any) -> Any:
 
 def _describe_body(trajectory: xr.Dataset, name: str) -> dict[str, Any]:
     track = body_track(trajectory, name)
-    noise = estimate_tracking_noise(track)
     described: dict[str, Any] = {
         "samples": int(track.time.size),
         "has_orientation": track.has_orientation,
@@ -101,9 +100,9 @@ def _describe_body(trajectory: xr.Dataset, name: str) -> dict[str, Any]:
             if track.time.size
         },
         **_speed(track),
-        **noise._asdict(),
+        **estimate_tracking_noise(track)._asdict(),
+        "circle_of_centers": _circle(track),
     }
-    described["circle_of_centers"] = _circle(track)
     if "ambiguous" in trajectory:
         scores = trajectory["ambiguous"].sel(body=name).values
         described["ambiguous_share"] = float((scores > 0).mean())
@@ -152,15 +151,13 @@ def _speed(track: Track) -> dict[str, Any]:
     interval = np.diff(track.time)
     near = interval <= 1.5 * np.median(interval)
     speed = np.hypot(np.diff(track.x), np.diff(track.y))[near] / interval[near]
-    described = {
+    return {
         "speed_mean_m_s": float(speed.mean()),
         "speed_median_m_s": float(np.median(speed)),
         "speed_99_percent_m_s": float(np.percentile(speed, 99.0)),
         "speed_max_m_s": float(speed.max()),
+        **(_turn_rate(track.theta, interval, near) if track.has_orientation else {}),
     }
-    if track.has_orientation:
-        described |= _turn_rate(track.theta, interval, near)
-    return described
 
 
 def _turn_rate(theta: Array, interval: Array, near: Bools) -> dict[str, float]:

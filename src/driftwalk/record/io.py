@@ -28,7 +28,7 @@ from driftwalk.record.cleaning.warn import (
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.pose import join_markers, two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.registry import PLAIN, origin_of
+from driftwalk.record.registry import PLAIN, loaders, origin_of
 from driftwalk.schema import Track, build_trajectory
 from driftwalk.schema.tracker_errors import noise_reach, without_far_outliers
 
@@ -237,8 +237,6 @@ def readable_formats() -> dict[str, str]:
     >>> readable_formats()["driftwalk"]
     "driftwalk's own NetCDF"
     """
-    from driftwalk.record.registry import loaders
-
     return {name: loader.description for name, loader in loaders().items()}
 
 
@@ -249,10 +247,8 @@ def _refuse_uneven(raw: RawRecording) -> None:
         sizes = {name: len(column) for name, column in columns.items() if column is not None}
         if len(set(sizes.values())) > 1:
             counts = ", ".join(f"{size} of {name}" for name, size in sizes.items())
-            raise FormatError(
-                f"is no recording of poses: body '{one.name}' has unequal numbers of values: "
-                + counts
-            )
+            what = f"body '{one.name}' has unequal numbers of values: {counts}"
+            raise FormatError(f"is no recording of poses: {what}")
 
 
 def _refuse_unused(options: ReadOptions, raw: RawRecording, format: str) -> None:
@@ -360,8 +356,7 @@ def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None
     """Return the union of the clocks and the bodies' columns on it."""
     has_theta = any(body.theta is not None for body in bodies)
     if len(bodies) == 1:
-        body = bodies[0]
-        return body.clock, body.x, body.y, body.theta
+        return bodies[0].clock, bodies[0].x, bodies[0].y, bodies[0].theta
     clocks = {id(body.clock): body.clock for body in bodies}
     time = np.unique(np.concatenate(list(clocks.values())))
     refuse_sparse(time, bodies)

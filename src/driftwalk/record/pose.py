@@ -59,8 +59,7 @@ def choose_keypoints(places: Mapping[str, Iterable[str]], options: ReadOptions) 
     """
     known = list(dict.fromkeys(name for own in places.values() for name in own))
     position = options.keypoint
-    if position is None and len(known) == 1:
-        position = known[0]
+    position = known[0] if position is None and len(known) == 1 else position
     if position not in known:
         got = "" if position is None else f" (got '{position}')"
         raise InputError(f"name the body's keypoint with `keypoint`{got}: {listed(known)}")
@@ -123,8 +122,7 @@ def recording_of_poses(
         if options.heading is not None and set(options.heading) <= set(points):
             theta = angle_between(*(points[name] for name in options.heading))
         bodies.append(RawBody(individual, clock, *points[names[0]], theta))
-    without = [name for name, own in places.items() if names[0] not in own]
-    if without:
+    if without := [name for name, own in places.items() if names[0] not in own]:
         notes.append(f"without the keypoint, and left out: {listed(without)}")
     if not confident:
         if stated:
@@ -198,9 +196,7 @@ def join_markers(raw: RawRecording, options: ReadOptions) -> None:
         marker = _marker(raw, options.keypoint, "keypoint")
         body = RawBody("0", marker.clock, marker.x.copy(), marker.y.copy())
     body.theta = angle_between(_at(start, body.clock), _at(end, body.clock))
-    used = {*options.heading, options.keypoint} - {None}
-    rest = len(raw.bodies) - len(used)
-    if rest:
+    if rest := len(raw.bodies) - len({*options.heading, options.keypoint} - {None}):
         raw.notes.append(f"bodies that are no marker of this one, and left out: {rest}")
     raw.bodies = [body]
     raw.angle_unit, raw.theta_axis, raw.bare_angle = "rad", "", False

@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from os import PathLike
 from pathlib import Path
 from typing import Any, Final, Protocol, runtime_checkable
@@ -23,6 +23,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError, InputError, naming_its_file, reason_of
 from driftwalk.core.files.bounded import text_of_name
 from driftwalk.record.bad_row import is_number, split_fields
+from driftwalk.record.containers import ZIP, members, names_in
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     CLOCK_UNITS,
@@ -32,8 +33,6 @@ from driftwalk.record.raw import (
     RawRecording,
     ReadOptions,
 )
-from driftwalk.record.stores.hdf5 import names_in
-from driftwalk.record.stores.npz import ZIP, members
 from driftwalk.record.tables.in_memory import table_in_memory
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.tables.text_source import detect_delimiter, first_lines
@@ -174,13 +173,10 @@ class Loader(Protocol):
     file that is nearly of the format then names what it lacks.
     """
 
-    @property
-    def name(self) -> str:
-        """Name of the format, as `load` takes it."""
-
-    @property
-    def description(self) -> str:
-        """One line for the list of formats."""
+    name: str
+    """Name of the format, as `load` takes it."""
+    description: str
+    """One line for the list of formats."""
 
     def sniff(self, head: bytes, path: Path, /) -> float:
         """Return how sure the loader is, 0 to 1, that the file is of its format.
@@ -281,7 +277,6 @@ class ForeignLoader:
         self._loader = loader
         self.name = str(loader.name)
         self.description = str(loader.description)
-        self.package = package
         self._by = f"the loader '{self.name}' of the package {package}"
         self.failed = ""
         """Error of the last attempt to recognise a file, ``""`` where there was none."""
@@ -335,26 +330,25 @@ def foreign_loaders(taken: Container[str]) -> tuple[dict[str, ForeignLoader], di
     """
     found: dict[str, ForeignLoader] = {}
     broken: dict[str, str] = {}
-    points = sorted(entry_points(group=GROUP), key=lambda point: (point.name, _package(point)))
-    for point in points:
+    points = [
+        (one.name, one.dist.name if one.dist is not None else one.value, one)
+        for one in entry_points(group=GROUP)
+    ]
+    for name, package, point in sorted(points, key=lambda one: one[:2]):
         try:
-            foreign = ForeignLoader(point.load(), _package(point))
+            foreign = ForeignLoader(point.load(), package)
         except Exception as error:  # whatever another package's code raises
             reason = f"{type(error).__name__}: {reason_of(error)}"
-            broken[point.name] = f"the package {_package(point)} has a broken loader ({reason})"
+            broken[name] = f"the package {package} has a broken loader ({reason})"
             continue
         if foreign.name in taken or foreign.name in found:
-            broken[point.name] = (
-                f"the package {foreign.package} has a loader named '{foreign.name}', which another "
-                "loader is named already"
+            broken[name] = (
+                f"the package {package} has a loader named '{foreign.name}', which another loader "
+                "is named already"
             )
         else:
             found[foreign.name] = foreign
     return found, broken
-
-
-def _package(point: EntryPoint) -> str:
-    return point.dist.name if point.dist is not None else point.value
 
 
 def _refuse_facts(raw: Any) -> None:
@@ -389,8 +383,6 @@ def _own(body: RawBody) -> RawBody:
     return replace(body, name=str(body.name), **copied)
 
 
-IN_MEMORY: Final = "table"
-"""Format of what is no file."""
 _OF_FILES: Final = ("delimiter", "header_line", "sheet", "topic", "x", "y", "theta", "keypoint")
 """Options that say something about a file alone."""
 
@@ -456,7 +448,7 @@ def origin_of(
         if given:
             raise InputError(f"{table.what}: `{given[0]}` is about a file: leave it out")
         name = table.what.removeprefix("the ")
-        return Origin(table.what, name, IN_MEMORY, partial(recording_of, table))
+        return Origin(table.what, name, "table", partial(recording_of, table))
     path = Path(data)
     if replicate is not None and kind_of_file(path) != "simulation":
         raise InputError(f"{path}: no simulation, so it has no replicates: omit `replicate`")

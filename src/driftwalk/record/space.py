@@ -90,19 +90,26 @@ MATRIX: Final = "matrix"
 
 
 @dataclass(frozen=True)
-class Turns:
-    """Orientations of a body in space, from its own axes to the file's."""
+class SpaceTrack:
+    """The samples of one body in space, in the units and axes of the file."""
 
-    values: Array
-    """Shape (n, 4), (n, 3) or (n, 9), NaN where there is none."""
-    form: str
-    """`QUATERNION` (x, y, z, w), `VECTOR` (axis times angle), `MATRIX` (down its columns), or the
-    order of Euler angles about the axes of the body, such as ``"XYZ"``."""
+    name: str
+    clock: Array
+    """Time stamps or frame numbers, shape (n,)."""
+    position: Array
+    """Positions, shape (n, 3), NaN where the body was not seen."""
+    turns: Array | None = None
+    """Orientations, from the body's own axes to the file's, shape (n, 4), (n, 3) or (n, 9), NaN
+    where there is none; None when the file has none."""
+    form: str = QUATERNION
+    """Form of the orientations: `QUATERNION` (x, y, z, w), `VECTOR` (axis times angle), `MATRIX`
+    (down its columns), or the order of Euler angles about the axes of the body, such as
+    ``"XYZ"``."""
     degrees: bool = False
-    """Whether angles are in degrees."""
+    """Whether their angles are in degrees."""
 
-    def in_plane(self, plane: Plane) -> tuple[Array, Array]:
-        """Return the angle in the plane and the tilt out of it.
+    def in_plane(self, plane: Plane) -> tuple[Array | None, Array | None]:
+        """Return the angle in the plane and the tilt out of it, None without orientations.
 
         The angle [rad] is the direction of that axis of the body that lies along the plane's x
         where the body is not turned: the yaw of a body that stands upright, and of one that rolls
@@ -114,15 +121,17 @@ class Turns:
         InputError
             When quaternions have not the length 1.
         """
-        angle, tilt = np.full(len(self.values), np.nan), np.full(len(self.values), np.nan)
-        known = np.isfinite(self.values).all(axis=1)
+        if self.turns is None:
+            return None, None
+        angle, tilt = np.full(len(self.turns), np.nan), np.full(len(self.turns), np.nan)
+        known = np.isfinite(self.turns).all(axis=1)
         if self.form in (QUATERNION, MATRIX):
             # Zeros alone are how some programs write that there is none.
             # float64 does not hold the squares of much smaller numbers.
-            known = known & (np.abs(self.values) > 1e-12).any(axis=1)
+            known = known & (np.abs(self.turns) > 1e-12).any(axis=1)
         if not known.any():
             return angle, tilt
-        rotation = self._rotation(self.values[known])
+        rotation = self._rotation(self.turns[known])
         x, y, up = plane.vectors
         forward = rotation.apply(x)
         angle[known] = np.arctan2(forward @ y, forward @ x)
@@ -153,19 +162,6 @@ MOST_TILT: Final = math.radians(30.0)
 """A body that leans further as a rule does not float in that plane."""
 
 
-@dataclass(frozen=True)
-class SpaceTrack:
-    """The samples of one body in space, in the units and axes of the file."""
-
-    name: str
-    clock: Array
-    """Time stamps or frame numbers, shape (n,)."""
-    position: Array
-    """Positions, shape (n, 3), NaN where the body was not seen."""
-    turns: Turns | None = None
-    """Orientations; None when the file has none."""
-
-
 def lay_flat(tracks: Sequence[SpaceTrack], plane: Plane) -> RawRecording:
     """Return the bodies in the plane, with notes on what speaks against the plane.
 
@@ -187,7 +183,7 @@ def lay_flat(tracks: Sequence[SpaceTrack], plane: Plane) -> RawRecording:
     for track in tracks:
         with np.errstate(invalid="ignore"):  # an infinite position is a gap
             x, y, height = (track.position @ vector for vector in plane.vectors)
-        angle, tilt = (None, None) if track.turns is None else track.turns.in_plane(plane)
+        angle, tilt = track.in_plane(plane)
         bodies.append(RawBody(track.name, track.clock, x, y, angle))
         notes += _against(track.name, plane, _span(height), max(_span(x), _span(y)), tilt)
     return RawRecording(bodies, y_axis="up", plane=plane.describe(), notes=notes)
@@ -225,7 +221,7 @@ class SpaceColumns:
     turns: Sequence[int] = ()
     """Those of its orientation; empty: it has none."""
     form: str = QUATERNION
-    """As in `Turns`."""
+    """As in `SpaceTrack`."""
     degrees: bool = False
 
 
@@ -270,8 +266,8 @@ def read_in_space(
         position = table.stack(one.position)
         if zero_is_missing:
             position[(position == 0.0).all(axis=1)] = np.nan
-        turns = Turns(table.stack(one.turns), one.form, one.degrees) if one.turns else None
-        tracks.append(SpaceTrack(name, clock, position, turns))
+        turns = table.stack(one.turns) if one.turns else None
+        tracks.append(SpaceTrack(name, clock, position, turns, one.form, one.degrees))
     flat = lay_flat(tracks, plane_of(up))
     return replace(flat, clock_origin=table.clock_origin, **facts)
 
@@ -326,12 +322,9 @@ def body_in_plane(
     InputError
         When the quaternions have not the length 1.
     """
-    axes = [values[places[axis]] for axis in ("x", "y", "z") if axis in places]
-    if len(axes) == 2:
-        axes.append(np.zeros(clock.size))
-    turned = set(PARTS) <= set(places)
-    parts = [values[places[part]] for part in PARTS] if turned else []
-    turns = Turns(np.column_stack(parts), QUATERNION) if turned else None
+    axes = [values[places[axis]] if axis in places else np.zeros(clock.size) for axis in "xyz"]
+    parts = [values[places[part]] for part in PARTS if set(PARTS) <= set(places)]
+    turns = np.column_stack(parts) if parts else None
     flat = lay_flat([SpaceTrack("0", clock, np.column_stack(axes), turns)], plane)
     return flat.bodies[0], flat.notes
 

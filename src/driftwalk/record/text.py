@@ -33,7 +33,6 @@ UTF16: Final = "UTF-16"
 """Encoding of "Unicode text", which begins with a byte order mark."""
 WINDOWS: Final = "Windows-1252"
 """Encoding of "CSV" in western Europe and America, with one byte for a letter such as µ or °."""
-_CODECS: Final = {UTF16: "utf-16", WINDOWS: "cp1252"}
 _MARKS: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _NO_TEXT: Final = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
@@ -55,11 +54,11 @@ def other_encoding(start: bytes) -> str | None:
         return UTF16
     if start.isascii() or _NO_TEXT.search(start):
         return None
-    for encoding, codec in ((None, "utf-8"), (WINDOWS, _CODECS[WINDOWS])):
+    for encoding, other in (("UTF-8", None), (WINDOWS, WINDOWS)):
         # Not as a whole: its last letter may be cut.
         with contextlib.suppress(UnicodeDecodeError):
-            codecs.getincrementaldecoder(codec)().decode(start)
-            return encoding
+            codecs.getincrementaldecoder(encoding)().decode(start)
+            return other
     return None
 
 
@@ -67,7 +66,7 @@ class TranscodedText(io.RawIOBase):
     """The contents of a text file as UTF-8, without a byte order mark."""
 
     def __init__(self, file: io.BufferedReader, encoding: str) -> None:
-        self._file = io.TextIOWrapper(file, _CODECS[encoding], newline="")
+        self._file = io.TextIOWrapper(file, encoding, newline="")
         self._encoding = encoding
 
     def readable(self) -> bool:
@@ -80,10 +79,8 @@ class TranscodedText(io.RawIOBase):
             # A letter of these encodings has up to four bytes in UTF-8.
             piece = self._file.read(max(len(buffer) // 4, 1)).encode("utf-8")
         except UnicodeError as error:
-            raise FormatError(
-                f"begins as {self._encoding} text but does not go on as such: save the file as "
-                "UTF-8"
-            ) from error
+            what = f"begins as {self._encoding} text but does not go on as such"
+            raise FormatError(f"{what}: save the file as UTF-8") from error
         buffer[: len(piece)] = piece
         return len(piece)
 
@@ -350,7 +347,6 @@ class _Collected:
 
     def _clock(self, frame: Any, block: bytes, line: int) -> Array:
         """Return the time stamps of a block in nanoseconds from the first one on."""
-        column = self._layout.stamps[0]
         try:
             ticks = []
             for column, reader in self._stamps.items():

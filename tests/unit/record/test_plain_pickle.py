@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record import load
-from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
+from driftwalk.record.containers import PickledArray, unpickle
 
 SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
 PLAIN = st.recursive(

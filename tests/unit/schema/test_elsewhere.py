@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.stores.hdf5 import opened_hdf5
+from driftwalk.record.containers import opened_hdf5
 from driftwalk.schema.stores.netcdf import kind_of_file, netcdf_bytes, open_netcdf
 
 

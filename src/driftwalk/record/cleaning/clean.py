@@ -48,8 +48,7 @@ def times_in_two_places(clock: Array, x: Array, y: Array, *, quantum: float = 0.
     starts = starts_of_runs(times)
     spread = np.maximum.reduceat(places, starts, 1) - np.minimum.reduceat(places, starts, 1)
     # The scale to metres leaves a resolution rounded.
-    apart: Array = times[starts[(spread > quantum * (1.0 + 1e-6)).any(axis=0)]]
-    return apart
+    return np.asarray(times[starts[(spread > quantum * (1.0 + 1e-6)).any(axis=0)]])
 
 
 def starts_of_runs(values: npt.NDArray[Any]) -> Indices:
@@ -323,8 +322,7 @@ def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns 
     anew = starts_over(body.clock)
     if sort == "error" or (anew and overlap(body.clock)):
         at = int(backwards[0])
-        found = [] if columns is None else columns(True)
-        if found:
+        if columns is not None and (found := columns(True)):
             remedy = f'{name_the_body(found)}, or `sort="sort"` if it is one body'
         elif anew:
             remedy = (

@@ -101,8 +101,7 @@ def _steps(clocks: list[Array]) -> Array:
     known = [start[np.isfinite(start)] for start in (clock[:100_000] for clock in clocks)]
     with np.errstate(over="ignore"):  # beyond float64 is as long as a step can be
         steps = np.concatenate([np.abs(np.diff(start)) for start in known])
-    bounded: Array = np.minimum(steps[steps > 0], np.finfo(np.float64).max)
-    return bounded
+    return np.asarray(np.minimum(steps[steps > 0], np.finfo(np.float64).max))
 
 
 def _whole_hours(steps: Array) -> bool:
@@ -116,9 +115,8 @@ def _remedy(column: str, first: float, interval: float) -> str:
         return "the format has its times in seconds; write them so"
     units = [unit for unit in CLOCK_UNITS if unit != "s"]
     likely = [unit for unit in units if _likely(CLOCK_UNITS[unit], first, interval)]
-    named = [
-        f"{_option(column, unit)} makes it {interval / CLOCK_UNITS[unit]:.3g} s" for unit in likely
-    ]
+    made = {unit: f"{interval / CLOCK_UNITS[unit]:.3g} s" for unit in likely}
+    named = [f"{_option(column, unit)} makes it {length}" for unit, length in made.items()]
     named = named or [f"{_option(column, 'UNIT')}, of {', '.join(CLOCK_UNITS)}"]
     return f"name the unit ({'; '.join(named)}); if it is seconds, {_option(column, 's')}"
 
@@ -151,7 +149,6 @@ class CounterPolicy(NamedTuple):
 
 COUNTER: Final = CounterPolicy()
 _BITS: Final = (8, 10, 12, 15, 16, 20, 24, 31, 32)
-_DAY_S: Final = 86_400.0
 
 
 def unwrap_counters(raw: RawRecording) -> list[str]:
@@ -168,7 +165,7 @@ def unwrap_counters(raw: RawRecording) -> list[str]:
         ticks = CLOCK_UNITS[raw.clock_unit]
         moduli += [(2.0**32 / 1e6 * ticks, "32 bits of microseconds")]
         moduli += [(2.0**32 / 1e3 * ticks, "32 bits of milliseconds")]
-        moduli += [(_DAY_S * ticks, "a day")] if raw.calendar == "" else []
+        moduli += [(86_400.0 * ticks, "a day")] if raw.calendar == "" else []
     moduli.sort()
     notes: dict[str, None] = {}
     unwrapped: dict[int, Array] = {}
@@ -177,8 +174,7 @@ def unwrap_counters(raw: RawRecording) -> list[str]:
         known = clock if finite.all() else clock[finite]
         if not (known[1:] < known[:-1]).any():
             continue
-        found = next((entry for entry in moduli if _rolls_over(known, entry[0])), None)
-        if found is not None:
+        if found := next((one for one in moduli if _rolls_over(known, one[0])), None):
             modulus, what = found
             unwrapped[key] = counted_on(clock, modulus)
             notes[f"the clock rolls over after {modulus:.10g} ({what}): it is unwrapped"] = None

@@ -211,7 +211,6 @@ def arena_diagonal(
     >>> arena_diagonal([x], [y], {"shape": "rectangle", "width_m": 6.0, "height_m": 8.0})
     10.0
     """
-    spans = [span_of(x), span_of(y)]
     stated = arena or {}
     if "vertices_m" in stated:
         corners = np.asarray(stated["vertices_m"], dtype=np.float64)
@@ -219,7 +218,7 @@ def arena_diagonal(
     else:
         side = stated.get("diameter_m", 0.0)
         tank = [stated.get("width_m", side), stated.get("height_m", side)]
-    return max(math.hypot(*spans), math.hypot(*tank))
+    return max(math.hypot(span_of(x), span_of(y)), math.hypot(*tank))
 
 
 def impossible_warning(name: str, steps: Impossible) -> str:

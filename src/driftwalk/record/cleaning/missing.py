@@ -55,10 +55,9 @@ def blank_missing(raw: RawRecording, marks: tuple[str, ...]) -> None:
         count = 0
         for body in raw.bodies:
             lost = _lost(body, mark)
-            rows = int(lost.sum())
-            if rows:
+            if lost.any():
                 body.blank(lost)
-            count += rows
+            count += int(lost.sum())
         raw.notes.append(f"samples that {argument_text('missing', mark)} makes missing: {count}")
 
 
@@ -127,9 +126,8 @@ def _marks_of(body: RawBody) -> list[tuple[str, str]]:
         runs, rows = _held_runs(square, still, usual)
         if runs > 1 or rows > MARK.held:
             times = "once" if runs == 1 else f"{runs} times"
-            marks.append(
-                (HELD, f"stays at exactly one place for several samples and leaps, {times}")
-            )
+            what = f"stays at exactly one place for several samples and leaps, {times}"
+            marks.append((HELD, what))
     return marks
 
 
@@ -148,8 +146,7 @@ def _far_places(x: Array, y: Array, near: Bools, far: Bools) -> list[tuple[str, 
         whole = px == np.round(px) and py == np.round(py) and (px == py or min(px, py) < 0.0)
         if count < (MARK.fewest if whole else MARK.any_place) or 2 * count >= x.size:
             continue
-        edges = np.flatnonzero(there[1:] != there[:-1])
-        leaps = (near if whole else far)[edges]
+        leaps = (near if whole else far)[there[1:] != there[:-1]]
         if not leaps.all() or np.hypot(x[~there] - px, y[~there] - py).min() <= 0.0:
             continue
         text = f"{px:.10g},{py:.10g}"

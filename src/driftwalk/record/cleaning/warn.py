@@ -209,10 +209,9 @@ def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
 
 def _refuse_beyond(body: RawBody, name: str, values: Array, most: float) -> None:
     known = np.isfinite(values)
-    largest = float(values.max(where=known, initial=0.0))
-    smallest = float(values.min(where=known, initial=0.0))
-    if max(largest, -smallest) > most:
-        number = largest if largest > -smallest else smallest
+    ends = [float(end(where=known, initial=0.0)) for end in (values.min, values.max)]
+    number = max(ends, key=abs)
+    if abs(number) > most:
         raise InputError(
             f"body '{body.name}' has {number:.3g} as {name}, which cannot be one: is the file "
             "damaged? Leave the field empty, or write nan, where nothing was measured"

@@ -14,10 +14,17 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError, damaged_as, listed
-from driftwalk.record.column_names import column_meaning
+from driftwalk.record.column_names import column_meaning, quantity_of
+from driftwalk.record.containers import (
+    NPY,
+    ZIP,
+    Hdf5Contents,
+    members,
+    opened_hdf5,
+    opened_npz,
+    text_of,
+)
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
-from driftwalk.record.stores.npz import NPY, ZIP, members, opened_npz
 from driftwalk.record.tables.in_memory import table_in_memory
 from driftwalk.record.tables.matlab import (
     Value,
@@ -59,12 +66,16 @@ class ArraysLoader:
             with opened_npz(path) as arrays:
                 return _of_arrays({name: _value(arrays[name]) for name in arrays}, options)
         with opened_hdf5(path) as contents:
-            return _of_arrays(_of_hdf5(contents), options)
+            stated: dict[str, Value] = {
+                str(name): np.atleast_2d(np.float64(value))
+                for name, value in contents.file.attrs.items()
+                if str(name).lower() in _RATES and np.size(value) == 1
+            }
+            return _of_arrays(_of_hdf5(contents, contents.file) | stated, options)
 
 
 def _are_positions(names: set[str]) -> bool:
-    meanings = (column_meaning(name) for name in names)
-    return {"x", "y"} <= {one.quantity for one in meanings if one is not None}
+    return {"x", "y"} <= set(map(quantity_of, names))
 
 
 def _holds_positions(path: Path) -> bool:
@@ -119,24 +130,15 @@ def _value(array: np.ndarray[Any, Any]) -> Value:
     return array[:, None] if array.ndim < 2 and array.size > 1 else np.atleast_2d(array)
 
 
-def _of_hdf5(contents: Hdf5Contents) -> dict[str, Value]:
-    """Return the arrays at the top of an HDF5 file, and its groups as structs."""
+def _of_hdf5(contents: Hdf5Contents, group: Any, above: str = "") -> dict[str, Value]:
+    """Return the arrays of a file or of a group in it, and the groups of a file as structs."""
     found: dict[str, Value] = {}
-    for name, entry in contents.file.items():
-        if hasattr(entry, "keys"):
-            inner = {str(one): entry[one] for one in entry if hasattr(entry[one], "shape")}
-            fields = {
-                _with_unit(one, array): _value(contents.array(f"{name}/{one}"))
-                for one, array in inner.items()
-            }
-            found[str(name)] = [fields]
-        elif hasattr(entry, "shape"):
-            found[_with_unit(str(name), entry)] = _value(contents.array(str(name)))
-    found |= {
-        str(name): np.atleast_2d(np.float64(value))
-        for name, value in contents.file.attrs.items()
-        if str(name).lower() in _RATES and np.size(value) == 1
-    }
+    for name in map(str, group):
+        entry = group[name]
+        if hasattr(entry, "shape"):
+            found[_with_unit(name, entry)] = _value(contents.array(above + name))
+        elif hasattr(entry, "keys") and not above:
+            found[name] = [_of_hdf5(contents, entry, f"{name}/")]
     return found
 
 
@@ -151,7 +153,6 @@ def _with_unit(name: str, entry: Any) -> str:
 
 
 _PARQUET: Final = b"PAR1"
-_FEATHER: Final = (b"ARROW1", b"FEA1")
 
 
 class ArrowLoader:
@@ -162,7 +163,7 @@ class ArrowLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the first letters."""
-        return 0.9 if head.startswith((_PARQUET, *_FEATHER)) else 0.0
+        return 0.9 if head.startswith((_PARQUET, b"ARROW1", b"FEA1")) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the columns."""
@@ -284,14 +285,13 @@ def _robotarium(value: Value) -> RawRecording | None:
     """Return the robots of the Robotarium: metres, y up, a column for each step of 33 ms."""
     if not isinstance(value, np.ndarray) or value.ndim != 2 or value.dtype.kind not in "fiu":
         return None
-    stamped = value.shape[0] % ROBOT_ROWS == 1 and value.shape[0] > 1
-    count = value.shape[0] // ROBOT_ROWS
-    if not count or value.shape[0] % ROBOT_ROWS > 1:
+    count, stamps = divmod(value.shape[0], ROBOT_ROWS)
+    if not count or stamps > 1:
         return None
     robots = value[: ROBOT_ROWS * count].reshape(count, ROBOT_ROWS, value.shape[1])
     bodies = _over_frames(robots[:, :3])
     notes = ["every column counts as a frame; the Robotarium steps each 33 ms unless it is late"]
-    if stamped:
+    if stamps:
         notes.append("the time stamps in the last row have no unit and are not read")
     return RawRecording(bodies, "frame", "m", y_axis="up", notes=notes, separate=True)
 

@@ -24,8 +24,6 @@ _MOST_NUMBERS: Final = 16
 """Length of a list up to which each of its numbers becomes a column; chosen by hand."""
 _POINTS: Final = words("points")
 
-KEYS = ("x", "y", "theta", "t")
-
 
 class JsonPointsLoader:
     """One body, one point a frame; ``null`` and ``[-1, -1]`` are frames without a detection."""
@@ -71,7 +69,7 @@ def _point(point: Any, index: int) -> list[float]:
         return [np.nan] * 4
     values: list[Any] = []
     if isinstance(point, dict) and {"x", "y"} <= set(point):
-        values = [point.get(key) for key in KEYS]
+        values = [point.get(key) for key in ("x", "y", "theta", "t")]
     elif isinstance(point, list) and 2 <= len(point) <= 3:
         values = [*point, None, None][:4]
     if not values or not _numbers(values) or any(isinstance(one, bool) for one in values):
@@ -118,17 +116,16 @@ class JsonLinesLoader:
 def _rows(entry: dict[str, Any], number: int) -> list[dict[str, Any]]:
     """Return a line as rows: one, or one for each object of the list that it holds."""
     flat = _flat(entry)
-    lists = [
-        name
+    lists = {
+        name: value
         for name, value in flat.items()
         if isinstance(value, list) and all(isinstance(one, dict) for one in value)
-    ]
+    }
     if len(lists) > 1:
         raise FormatError(f"holds several lists of objects: {', '.join(lists)}", line=number)
     shared = {name: value for name, value in flat.items() if not isinstance(value, list)}
-    if not lists:
-        return [shared]
-    return [{**shared, **_flat(one)} for one in flat[lists[0]]]
+    inner: list[dict[str, Any]] = next(iter(lists.values()), [{}])
+    return [shared | _flat(one) for one in inner]
 
 
 def _numbers(value: list[Any]) -> bool:
@@ -220,19 +217,18 @@ class YoloFolderLoader:
                 "the boxes are shares of the image, and the files do not hold its size: state it "
                 'in pixels, as in `box="cxcywh@1920x1080"`'
             )
-        files = _files(path)
-        frames = _frames({file: file.stem for file in files})
+        frames = _frames({file: file.stem for file in _files(path)})
         if not frames:
             raise FormatError("the names of its files do not end in numbers of frames")
         rows = []
-        for file in files:
+        for file, frame in frames.items():
             for number, line in enumerate(header_rows(file, _MOST_BOXES), start=1):
                 row = _shares(line)
                 if line.strip() and not row:
                     what = "expected class, centre x and y, width, height as shares of the image"
                     raise FormatError(what, path=file, line=number)
                 if row:
-                    rows.append([frames[file], *row])
+                    rows.append([frame, *row])
         sixth = [row[6] for row in rows if row[6] is not None]
         if all(row[7] is None for row in rows) and any(one > 1.0 for one in sixth):
             rows = [[*row[:6], None, row[6]] for row in rows]  # tracked, without confidences

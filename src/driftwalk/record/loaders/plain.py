@@ -1,26 +1,37 @@
-"""Plain tables, tables of programs with one header line, and one matrix per coordinate."""
+"""Plain tables of text and workbooks, of programs with one header line; matrices of coordinates."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, damaged_as
+from driftwalk.record.containers import ZIP, refuse_huge_zip, zip_names
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.tables.rows import recording_of
+from driftwalk.record.tables.in_memory import TABLE, MemorySource, objects, text_of_cell
+from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.record.tables.text_source import (
     TextSource,
     first_lines,
     first_names,
     first_row,
+    header_advice,
+    heading_of,
+    is_data,
+    is_numeric_row,
     read_header,
+    units_below,
 )
 from driftwalk.record.text import read_table
+from driftwalk.schema.stores.netcdf import file_start
 
 
 class PlainLoader:
@@ -41,7 +52,7 @@ class PlainLoader:
         return recording_of(TextSource(path, options), options)
 
 
-@dataclass(frozen=True)
+@dataclass
 class HeadedFormat:
     """A format with one header line, which is recognised by its first names."""
 
@@ -218,4 +229,117 @@ def _matrix(path: Path) -> tuple[list[Array], list[str]]:
     return [table.numbers[column] for column in range(len(names))], labels
 
 
-LOADERS = (PlainLoader(), MatricesLoader())
+_OLD: Final = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+"""Start of Excel's format before 2007, in which workbooks with a password are stored as well."""
+_WORKBOOK: Final = "xl/workbook.xml"
+_OTHERS: Final = {
+    "xl/workbook.bin": "is a binary workbook (.xlsb): save it as .xlsx or CSV",
+    "content.xml": "is an OpenDocument file: save it as .xlsx or CSV",
+}
+"""Members of zip files of other spreadsheets, and what to do."""
+
+
+class ExcelLoader:
+    """Columns as in a plain table; times may be dates, times of day or numbers."""
+
+    name = "excel"
+    description = "Excel workbook, .xlsx (columns as in a plain table; `sheet` names the sheet)"
+
+    def sniff(self, head: bytes, path: Path) -> float:
+        """Recognise a workbook, also one that is refused with the advice to save it as .xlsx."""
+        named = path.suffix.lower() in (".xlsx", ".xlsm")
+        inside = {_WORKBOOK, *_OTHERS}
+        known = head.startswith(ZIP) and (named or inside & zip_names(path))
+        return 0.9 if known or head.startswith(_OLD) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the sheet that holds positions."""
+        if file_start(path).startswith(_OLD):
+            raise FormatError(
+                "is a workbook of Excel before 2007 (.xls), or one with a password: save it as "
+                ".xlsx without a password, or as CSV"
+            )
+        members = zip_names(path)
+        if _WORKBOOK not in members:
+            advice = next((text for name, text in _OTHERS.items() if name in members), None)
+            raise FormatError(advice or "is no Excel workbook, or a damaged one")
+        try:
+            from openpyxl import load_workbook
+        except ImportError as error:
+            raise InputError("a workbook needs openpyxl: pip install 'driftwalk[excel]'") from error
+        with damaged_as("as an Excel workbook", path), warnings.catch_warnings():
+            # What the library remarks on styles and rules has no part in the numbers.
+            warnings.simplefilter("ignore")
+            refuse_huge_zip(path)
+            book = load_workbook(path, read_only=True, data_only=True, keep_links=False)
+            with closing(book):
+                sources = [SheetSource(one.title, _rows(one), options) for one in book.worksheets]
+        filled = {one.sheet: one for one in sources if one.names}
+        return recording_of(the_one_that_fits(filled, options, "sheet"), options)
+
+
+Row = Sequence[Any]
+
+
+def _rows(sheet: Any) -> list[tuple[int, Row]]:
+    """Return the rows of a sheet that are not blank with their numbers from 1.
+
+    The size that the sheet declares may be wrong.
+    """
+    sheet.reset_dimensions()
+    # A sheet has no more rows, so a row of a higher number is damage.
+    rows = enumerate(islice(sheet.iter_rows(values_only=True), 1 << 20), start=1)
+    return [one for one in rows if any(cell is not None and cell != "" for cell in one[1])]
+
+
+class SheetSource(MemorySource):
+    """A table in a sheet; the first row that names positions is its header, if there is one."""
+
+    def __init__(self, sheet: str, rows: list[tuple[int, Row]], options: ReadOptions) -> None:
+        self.sheet, self._advice = sheet, ""
+        begin = options.header_line or 1
+        found = [entry for entry in rows if entry[0] >= begin]
+        texts = [_texts(row) for _, row in found[: TABLE.heading_rows]]
+        names: list[str] = texts[0] if texts else []
+        units: list[str] = []
+        above = 1
+        if options.header_line is not None:
+            names = names if found and found[0][0] == begin else []
+            if len(texts) > 2 and (units := units_below(names, texts[1], options)):
+                above = 2
+        elif not names or is_numeric_row(names):
+            above = 0
+        else:
+            for at in range(len(texts)):
+                if (heading := heading_of(texts[at : at + 3], options)) is not None:
+                    names, units, above = heading.names, heading.units, at + heading.rows
+                    break
+            else:
+                above = 0 if is_data(names, texts[1:], options) else 1
+                self._advice = header_advice(texts, found[0][0])
+        self._lines = [line for line, _ in found[above:]]
+        columns = [
+            objects([row[at] if at < len(row) else None for _, row in found[above:]])
+            for at in range(len(names))
+        ]
+        names = names if above else [""] * len(names)
+        super().__init__(f"sheet '{sheet}'", names, columns, has_header=above > 0, units=units)
+
+    def error_in_row(self, message: str, row: int) -> FormatError:
+        """Return an error about a row of the table, from 0."""
+        return FormatError(f"{message} ({self.what}){self._advice}", line=self._lines[row])
+
+    def error(self, message: str) -> FormatError:
+        """Return an error about the sheet."""
+        return FormatError(f"{self.what}: {message}{self._advice}")
+
+
+def _texts(row: Row) -> list[str]:
+    """Return the cells of a row as texts, up to the last that is filled."""
+    texts = [text_of_cell(cell) for cell in row]
+    while texts and not texts[-1]:
+        texts.pop()
+    return texts
+
+
+LOADERS = (PlainLoader(), MatricesLoader(), ExcelLoader())

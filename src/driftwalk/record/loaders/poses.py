@@ -23,9 +23,9 @@ from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.clean import split_bodies
+from driftwalk.record.containers import Hdf5Contents, frame_in, names_in, opened_hdf5, text_of
 from driftwalk.record.pose import Confidence, Places, choose_keypoints, recording_of_poses
 from driftwalk.record.raw import LENGTH_UNITS, Array, Marks, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.stores.hdf5 import Hdf5Contents, frame_in, names_in, opened_hdf5, text_of
 from driftwalk.record.tables.text_source import first_names, first_row
 from driftwalk.record.text import header_rows, read_table
 from driftwalk.schema.stores.netcdf import HDF5, MAGIC, file_start, open_netcdf, text_attribute
@@ -136,11 +136,8 @@ def _header(path: Path) -> list[list[str]]:
     count = next((at for at, row in enumerate(rows[:4]) if row[0] == "coords"), -1) + 1
     first = [row[0] for row in rows[:count]]
     if first not in (["scorer", *LEVELS[-2:]], ["scorer", *LEVELS]):
-        raise FormatError(
-            "the first column of the header is not scorer, (individuals,) bodyparts, coords: is it "
-            "DeepLabCut's?",
-            line=1,
-        )
+        what = "the first column of the header is not scorer, (individuals,) bodyparts, coords"
+        raise FormatError(f"{what}: is it DeepLabCut's?", line=1)
     if any(len(row) != len(rows[0]) for row in rows[:count]):
         raise FormatError("the header rows have different numbers of fields", line=count)
     if len(rows) > count and not is_number(rows[count][0]):
@@ -159,17 +156,11 @@ def _bodyparts(columns: Sequence[tuple[str, ...]], first: int) -> Places:
     for individual, parts in found.items():
         for part, place in parts.items():
             if missing := {"x", "y"} - set(place):
-                raise FormatError(
-                    f"no column of {min(missing)} for bodypart '{part}' of individual "
-                    f"'{individual}'"
-                )
+                whose = f"bodypart '{part}' of individual '{individual}'"
+                raise FormatError(f"no column of {min(missing)} for {whose}")
     if not found:
         raise FormatError("no columns of x and y below any bodypart")
     return found
-
-
-ORDER: Final = ("track", "xy", "node", "frame")
-"""Dimensions as SLEAP writes them; newer files name theirs in an attribute."""
 
 
 class SleapLoader:
@@ -187,7 +178,7 @@ class SleapLoader:
         """Read the chosen nodes of every track."""
         with opened_hdf5(path) as contents:
             nodes = contents.texts("node_names")
-            tracks = _sleap_array(contents, "tracks", *ORDER)
+            tracks = _sleap_array(contents, "tracks", "track", "xy", "node", "frame")
             count, *shape = tracks.shape
             if shape[:2] != [2, len(nodes)]:
                 raise FormatError(
@@ -205,7 +196,10 @@ class SleapLoader:
 
 
 def _sleap_array(contents: Hdf5Contents, name: str, *order: str) -> xr.DataArray:
-    """Return an array of numbers over these dimensions."""
+    """Return an array of numbers over these dimensions.
+
+    SLEAP writes them in this order; newer files name theirs in an attribute.
+    """
     import xarray as xr
 
     values = contents.array(name)
@@ -247,10 +241,8 @@ class SleapCsvLoader:
             raw.bodies = split_bodies(rows, table.codes[track], table.labels[track])
             for one in raw.bodies:
                 if not one.name and np.unique(one.clock).size < one.clock.size:
-                    raise FormatError(
-                        "several instances of one frame have no track: let SLEAP track them, and "
-                        "export again"
-                    )
+                    what = "several instances of one frame have no track"
+                    raise FormatError(f"{what}: let SLEAP track them, and export again")
                 one.name = one.name or "0"
         return raw
 
@@ -262,9 +254,6 @@ def _nodes(names: list[str]) -> dict[str, dict[str, int]]:
     nodes = _places(enumerate(("0", *one) for one in scored)).get("0", {})
     return {node: place for node, place in nodes.items() if node and {"x", "y"} <= set(place)}
 
-
-SINGLE: Final = "centroid"
-"""Name of the one point of a bounding box."""
 
 TEXTS: Final = (
     *("arena", "arena_found", "origin_shift_m", "simulated", "tracked_from", "complete"),
@@ -301,7 +290,9 @@ class MovementLoader:
             raise FormatError(f"the dimension 'space' has {space}, expected x and y")
         position = _whole(position.isel(space=[space.index(axis) for axis in "xy"]), "space")
         confidence = _whole(_array(dataset, "confidence")) if "confidence" in dataset else None
-        keypoints, individuals = (_names(position, name) for name in ("keypoint", "individual"))
+        keypoints, individuals = (
+            [*map(str, position.get_index(name).to_numpy())] for name in ("keypoint", "individual")
+        )
         time, unit = _clock(dataset)
         sleap = str(dataset.attrs.get("source_software")) == "SLEAP"
         usual, names = OF_SLEAP if sleap else OF_MOVEMENT, (keypoints, individuals)
@@ -314,9 +305,9 @@ class MovementLoader:
                 theta = angles[body.name]
                 body.theta = theta if np.isfinite(theta).any() else None
         rate = dataset.attrs.get("fps")
-        units = (*LENGTH_UNITS, "px")
-        stated = next((one for one in units if one == position.attrs.get("units")), None)
-        raw.clock_unit, raw.length_unit = unit, stated or options.length_unit or "px"
+        stated = position.attrs.get("units")
+        known = stated if stated in (*LENGTH_UNITS, "px") else options.length_unit or "px"
+        raw.clock_unit, raw.length_unit = unit, known
         raw.frame_rate_hz = float(rate) if rate is not None and unit == "frame" else None
         raw.attrs = _known(dataset, path) if own else {}
         return raw
@@ -324,12 +315,10 @@ class MovementLoader:
 
 def _orientation(dataset: xr.Dataset, individuals: list[str]) -> dict[str, Array]:
     """Return the angles [rad] of every individual, which driftwalk writes next to the positions."""
-    angles = _array(dataset, "orientation")
-    if sorted(map(str, angles.dims)) != ["individuals", "time"]:
-        raise FormatError("'orientation' is not over time and individuals")
+    angles = _in_order(_array(dataset, "orientation"), "time", "individuals")
     if angles.attrs.get("units") != "rad":
         raise FormatError("'orientation' does not state its unit, rad")
-    values = angles.transpose("time", "individuals").values.astype(np.float64)
+    values = angles.values.astype(np.float64)
     return {name: np.ascontiguousarray(values[:, at]) for at, name in enumerate(individuals)}
 
 
@@ -359,15 +348,9 @@ def _whole(values: xr.DataArray, *further: str) -> xr.DataArray:
     values = values.rename(
         {dim: str(dim)[:-1] for dim in values.dims if dim in ("keypoints", "individuals")}
     )
-    only = {"keypoint": SINGLE, "individual": "0"}
+    only = {"keypoint": "centroid", "individual": "0"}  # a bounding box has one point
     missing = {name: [one] for name, one in only.items() if name not in values.dims}
     return _in_order(values.expand_dims(missing), "time", *further, "keypoint", "individual")
-
-
-def _names(values: xr.DataArray, dimension: str) -> list[str]:
-    if dimension in values.coords:
-        return [str(name) for name in values[dimension].values]
-    return [str(index) for index in range(values.sizes[dimension])]
 
 
 def _clock(dataset: xr.Dataset) -> tuple[Array, str]:

@@ -17,7 +17,7 @@ from driftwalk.record.raw import Array, ReadOptions, TableLayout
 from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS, words
 
 if TYPE_CHECKING:
-    from driftwalk.record.tables.in_memory import TableSource
+    from driftwalk.record.tables.text_source import TableSource
 
 FORMS: Final = ("xyxy", "xywh", "cxcywh", "none")
 _STATED: Final = re.compile(
@@ -63,11 +63,20 @@ class Box:
     """Whether it looks the same after a half or quarter turn, so that its angle may leap by one."""
 
 
+Meanings = Mapping[int, ColumnMeaning]
+
+
+class _Sides(NamedTuple):
+    """Columns that may be sides of a box."""
+
+    columns: dict[str, int]
+    units: dict[str, str]
+    plain: bool
+    """Whether corners are named by numbers alone."""
+
+
 def find_box(
-    source: TableSource,
-    options: ReadOptions,
-    meanings: Mapping[int, ColumnMeaning],
-    chosen: Mapping[str, str],
+    source: TableSource, options: ReadOptions, meanings: Meanings, chosen: Mapping[str, str]
 ) -> Box | None:
     """Return the columns that are the sides of a box, None where there are none.
 
@@ -79,7 +88,8 @@ def find_box(
     """
     if options.box == "none":
         return None
-    found, units, plain = _sides(source, meanings)
+    sides = _sides(source, meanings)
+    found = sides.columns
     if options.box is not None:
         match = _STATED.fullmatch(options.box)
         if match is None:
@@ -87,24 +97,22 @@ def find_box(
                 f"`box` is one of {', '.join(FORMS)}, and of shares of the image its size in "
                 f"pixels may follow, as in cxcywh@1920x1080; got '{options.box}'"
             )
-        box = _stated(match["form"], found, units)
+        box = _stated(match["form"], sides)
         return replace(box, image=(int(match["w"]), int(match["h"]))) if match["w"] else box
-    if {"x", "y"} & set(chosen) and not {"x1", "w"} & set(chosen):
-        return None
-    if source.matrices:
+    if source.matrices or ({"x", "y"} & set(chosen) and not {"x1", "w"} & set(chosen)):
         return None
     quad = _quad(source)
     if quad is not None:
         return quad
     if set(_CORNERS) <= set(found):
-        return _corners(source, found, units, meanings, plain=plain)
+        return _corners(source, sides, meanings)
     if {"x1", "y1", "w", "h"} <= set(found) and not {"x", "y"} <= set(found):
-        return _stated("xywh", found, units)
+        return _stated("xywh", sides)
     if not {"x", "y", "w", "h"} <= set(found):
         return None
     names = [source.names[found[side]] for side in ("x", "y", "w", "h")]
     if {word.lower() for name in names[:2] for word in words_of(name)} & words("centre"):
-        return _stated("cxcywh", found, units)
+        return _stated("cxcywh", sides)
     raise InputError(
         f"the columns {listed([repr(name) for name in names])} are a box, and nothing says "
         'whether x and y are its corner or its centre: add `box="xywh"` if they are the corner '
@@ -112,10 +120,7 @@ def find_box(
     )
 
 
-def _sides(
-    source: TableSource, meanings: Mapping[int, ColumnMeaning]
-) -> tuple[dict[str, int], dict[str, str], bool]:
-    """Return the column of each side, its unit, and whether corners are named by numbers alone."""
+def _sides(source: TableSource, meanings: Meanings) -> _Sides:
     found: dict[str, int] = {}
     units: dict[str, str] = {}
     plain = True
@@ -146,11 +151,12 @@ def _sides(
     for at, meaning in meanings.items():
         if meaning.rank < 0 and meaning.quantity in ("x", "y"):
             found[meaning.quantity], units[meaning.quantity] = at, meaning.unit
-    return found, units, plain
+    return _Sides(found, units, plain)
 
 
-def _stated(form: str, found: Mapping[str, int], units: Mapping[str, str]) -> Box:
+def _stated(form: str, given: _Sides) -> Box:
     """Return the box of a form, or say which columns it lacks."""
+    found = given.columns
     names = sides = _CORNERS if form == "xyxy" else ("x", "y", "w", "h")
     if form != "xyxy" and "x1" in found and "x" not in found:
         sides = ("x1", "y1", "w", "h")
@@ -160,33 +166,25 @@ def _stated(form: str, found: Mapping[str, int], units: Mapping[str, str]) -> Bo
         raise InputError(f"a box of the form '{form}' has no column of {listed(missing)}: {wanted}")
     columns = {name: found[side] for name, side in zip(names, sides, strict=True)}
     replaced = tuple(found[side] for side in sides if side not in ("x", "y"))
-    return Box(form, columns, [units[side] for side in sides], replaced)
+    return Box(form, columns, [given.units[side] for side in sides], replaced)
 
 
-def _corners(
-    source: TableSource,
-    found: Mapping[str, int],
-    units: Mapping[str, str],
-    meanings: Mapping[int, ColumnMeaning],
-    *,
-    plain: bool,
-) -> Box | None:
+def _corners(source: TableSource, sides: _Sides, meanings: Meanings) -> Box | None:
     """Return the box of two corners; values decide whether x1, y1, x2, y2 are two bodies."""
-    box = _stated("xyxy", found, units)
+    found, _, plain = sides
+    box = _stated("xyxy", sides)
     numbered = {one.body for one in meanings.values() if one.body.isdecimal()}
-    if plain and (
-        not (numbered <= {"1", "2"} or numbered <= {"0", "1"})
-        or any(one.quantity == "theta" and one.body in numbered for one in meanings.values())
-    ):
+    turned = any(one.quantity == "theta" and one.body in numbered for one in meanings.values())
+    if plain and (turned or not (numbered <= {"1", "2"} or numbered <= {"0", "1"})):
         return None
     centre = {"x", "y"} <= set(found)
     if not plain and not centre:
         return box
     values = _values(source, [found[side] for side in (*_CORNERS, *("xy" if centre else ""))])
-    if values is None:
+    if not values or not values[0].size:
         return None
     x1, y1, x2, y2 = values[:4]
-    if not len(x1) or (x2 < x1).any() or (y2 < y1).any():
+    if (x2 < x1).any() or (y2 < y1).any():
         return None
     if centre:
         apart = np.hypot(values[4] - 0.5 * (x1 + x2), values[5] - 0.5 * (y1 + y2))
@@ -229,7 +227,7 @@ def _quad(source: TableSource) -> Box | None:
         return None
     if not named:
         values = _values(source, [found[side] for side in _QUAD])
-        if values is None or not len(values[0]):
+        if not values or not values[0].size:
             return None
         x, y = np.array(values[::2]), np.array(values[1::2])
         skew = np.hypot(x[0] - x[1] + x[2] - x[3], y[0] - y[1] + y[2] - y[3])
@@ -290,10 +288,8 @@ def box_angle(
     """
     side = {name: values[at] for name, at in box.sides.items()}
     if box.form == "quad" and theta is None:
-        first, second, third, fourth = (
-            np.array([side[f"x{n}"], side[f"y{n}"]]) for n in range(1, 5)
-        )
-        along, across = second + third - first - fourth, third + fourth - first - second
+        a, b, c, d = (np.array([side[f"x{n}"], side[f"y{n}"]]) for n in range(1, 5))
+        along, across = b + c - a - d, c + d - a - b
         theta = np.arctan2(along[1], along[0])
         w, h, turn = np.hypot(*along), np.hypot(*across), 2.0 * np.pi
     elif theta is None or "w" not in side:
@@ -317,5 +313,4 @@ def _followed(theta: Array, w: Array, h: Array, turn: float) -> Array:
     axis = theta if ratio < BOX.square else theta + np.where(h > w, turn / 4.0, 0.0)
     if np.ptp(theta) > BOX.full * period:
         return theta
-    followed: Array = np.unwrap(axis, period=period)
-    return followed
+    return np.asarray(np.unwrap(axis, period=period))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
 from driftwalk.record.raw import LENGTH_UNITS, MISSING, ReadOptions
 from driftwalk.record.tables.boxes import find_box
-from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.tables.named_columns import (
     ColumnReading,
     NamedColumns,
@@ -22,6 +21,9 @@ from driftwalk.record.tables.named_columns import (
 )
 from driftwalk.record.tables.stamps import OF_DAY
 from driftwalk.record.vocabulary import ALLOWED, FRONT, LENGTHS, MIDDLE, PARTS, REAR
+
+if TYPE_CHECKING:
+    from driftwalk.record.tables.text_source import TableSource
 
 _ON_GLOBE: Final = ("lon", "lat")
 
@@ -56,12 +58,9 @@ class _Reader(NamedColumns):
         self.choose()
         box = find_box(self.source, self.options, self.meanings, self.chosen)
         if box is not None:
-            around = [
-                at
-                for at, one in self.meanings.items()
-                if one.body.lower() in ("bbox", "bb", "box") and at not in box.sides.values()
-            ]
-            self.drop((*box.replaced, *around), box.why)
+            words = ("bbox", "bb", "box")
+            around = {at for at, one in self.meanings.items() if one.body.lower() in words}
+            self.drop({*box.replaced} | (around - {*box.sides.values()}), box.why)
             self.result.box = box if box.sides else None
             self.result.notes += box.notes
         self.leave_out_other_pairs()
@@ -116,13 +115,12 @@ class _Reader(NamedColumns):
 
     def _leave_out_the_third_axis(self) -> None:
         """Leave out heights that nobody asks for, and parts of quaternions that are not whole."""
-        meanings = self.meanings
         turned = self._turned()
-        parts = [at for at, one in meanings.items() if one.quantity in QUATERNION]
-        loose = [at for at in parts if meanings[at].body not in turned]
+        parts = {at: one for at, one in self.meanings.items() if one.quantity in QUATERNION}
+        loose = [at for at, one in parts.items() if one.body not in turned]
         self.drop(loose, "part of an incomplete quaternion, or of one next to an angle")
         if self.options.up is None:
-            height = [at for at, one in meanings.items() if one.quantity == "z"]
+            height = [at for at, one in self.meanings.items() if one.quantity == "z"]
             self.drop(height, "height: the plane of the water is x, y without `up`")
 
     def _turned(self) -> set[str]:
@@ -141,9 +139,8 @@ class _Reader(NamedColumns):
         self, only: dict[str, int], places: dict[str, dict[str, int]], bodies: set[str]
     ) -> None:
         """Give the only body an orientation that stands without its number: x1, y1, heading."""
-        loose = [
-            one["theta"] for body, one in places.items() if body not in bodies and "theta" in one
-        ]
+        angles = {body: one["theta"] for body, one in places.items() if "theta" in one}
+        loose = [at for body, at in angles.items() if body not in bodies]
         if "theta" in only or not loose:
             return
         if len(loose) > 1:
@@ -188,11 +185,10 @@ class _Reader(NamedColumns):
 
     def _find_confidences(self) -> None:
         """Give each body the column of its confidence."""
-        found = [
-            (one.body, at) for at, one in self.meanings.items() if one.quantity == "confidence"
-        ]
+        found = {at: one.body for at, one in self.meanings.items() if one.quantity == "confidence"}
         for body, places in self.result.bodies.items():
-            own = [at for of, at in found if of == body] or [at for of, at in found if not of]
+            own = [at for at, of in found.items() if of == body]
+            own = own or [at for at, of in found.items() if not of]
             if len(own) > 1:
                 raise InputError(self.both(own[0], own[1], "confidence"))
             if own:
@@ -204,26 +200,24 @@ class _Reader(NamedColumns):
         if not own:
             return None
         (rank, at), *others = sorted(own)
-        rivals = [other for other_rank, other in others if other_rank == rank]
-        alike = rank > 1 and (
-            self.lenient or (quantity == "t" and rivals and self._run_together(at, rivals[0]))
-        )
-        if rivals and not alike:
-            raise InputError(self.both(at, rivals[0], quantity))
+        if others and others[0][0] == rank:
+            rival = others[0][1]
+            alike = self.lenient or (quantity == "t" and self._run_together(at, rival))
+            if rank <= 1 or not alike:
+                raise InputError(self.both(at, rival, quantity))
         name = self.result.columns[at].name
         self.drop((other for _, other in others), f"'{name}' is read as {quantity} instead")
         return at
 
     def _run_together(self, first: int, second: int) -> bool:
         """Whether two clocks differ by a constant in the first rows, to 1e-3 and rounding."""
-        texts = [(row[first], row[second]) for row in self.source.sample() if len(row) > second]
+        pairs = [(row[first], row[second]) for row in self.source.sample() if len(row) > second]
+        known = [pair for pair in pairs if "" not in pair]
         try:
-            values = np.array(
-                [[float(one.replace(",", ".")) for one in pair] for pair in texts if "" not in pair]
-            )
+            apart = [float(b.replace(",", ".")) - float(a.replace(",", ".")) for a, b in known]
         except ValueError:
             return False
-        return values.size > 0 and float(np.ptp(values[:, 1] - values[:, 0])) <= 1e-3 + 1e-9
+        return bool(apart) and float(np.ptp(apart)) <= 1e-3 + 1e-9
 
     def _find_clock(self) -> None:
         """Find the clock: frames, numbers, seconds and their fraction, or time stamps."""
@@ -273,9 +267,8 @@ class _Reader(NamedColumns):
     def _is_fraction(self, time: int, part: int) -> bool:
         """Whether a column holds less than a second, next to whole seconds."""
         whole = all(one.lstrip("-").isdecimal() for one in self._sampled(time))
-        digits = {"ns": 9, "us": 6, "ms": 3}.get(self.meanings[part].unit, 0)
-        parts = self._sampled(part)
-        return whole and all(one.isdecimal() and int(one) < 10**digits for one in parts)
+        most = 10 ** {"ns": 9, "us": 6, "ms": 3}.get(self.meanings[part].unit, 0)
+        return whole and all(one.isdecimal() and int(one) < most for one in self._sampled(part))
 
     def _find_units(self) -> None:
         result = self.result
@@ -291,8 +284,8 @@ class _Reader(NamedColumns):
             result.length_unit = "px"
         elif units and set(units.values()) <= set(LENGTH_UNITS):
             result.length_unit = units[min(units)]
-            metres = {at: LENGTH_UNITS[unit] for at, unit in units.items()}
-            factors = {at: one / LENGTH_UNITS[result.length_unit] for at, one in metres.items()}
+            whole = LENGTH_UNITS[result.length_unit]
+            factors = {at: LENGTH_UNITS[unit] / whole for at, unit in units.items()}
             result.factors = {at: factor for at, factor in factors.items() if factor != 1.0}
         else:
             result.length_unit = _agreed(list(units.values()), "positions", "x")
@@ -348,11 +341,10 @@ class _Reader(NamedColumns):
 
 
 def _agreed(units: list[str], what: str, quantity: str) -> str:
-    distinct = sorted(set(units))
-    if len(distinct) > 1:
-        shown = ", ".join(unit or "none" for unit in distinct)
+    if len(set(units)) > 1:
+        shown = ", ".join(unit or "none" for unit in sorted(set(units)))
         raise InputError(
             f"the columns of {what} name different units ({shown}): state that of each, as in "
             f"{argument_text('columns', {quantity: 'NAME:UNIT'})}"
         )
-    return distinct[0] if distinct else ""
+    return units[0] if units else ""

@@ -1,4 +1,4 @@
-"""Tables: their interface to the reader, and columns in memory with numbers, names or time stamps.
+"""Tables in memory: columns with numbers, names or time stamps.
 
 Data frames, arrays, a mapping of columns.
 """
@@ -11,7 +11,7 @@ import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -46,37 +46,6 @@ class TablePolicy(NamedTuple):
 
 
 TABLE: Final = TablePolicy()
-
-
-class TableSource(Protocol):
-    """A table with one row per sample."""
-
-    names: list[str]
-    """Names of the columns, ``""`` where there is none."""
-    units: list[str]
-    """Units in a row below the names; empty where there is no such row."""
-    has_header: bool
-    """Whether the columns have names."""
-    matrices: bool
-    """Whether numbers after x and y count the columns of matrices, each of which is a body."""
-
-    def sample(self) -> list[list[str]]:
-        """Return the first rows as texts."""
-
-    def stamps(self, column: int, /) -> StampForm | None:
-        """Return how the first time stamp of a column is written, None where it has none."""
-
-    def read(self, wanted: TableLayout, /, *, head: bool = False) -> Table:
-        """Read the columns that a layout names; of the `head` no more than the first rows.
-
-        Raises
-        ------
-        FormatError
-            When a row or a field cannot be read.
-        """
-
-    def error(self, message: str, /) -> FormatError:
-        """Return an error about the header, or the table where it has none."""
 
 
 Values = npt.NDArray[Any]
@@ -120,8 +89,7 @@ def as_numbers(values: Values, name: str) -> Array:
             return np.array(cells, dtype=np.float64)
     plain = [_plain(cell) for cell in cells]
     texts = [cell for cell in plain if isinstance(cell, str)]
-    comma = any("," in text for text in texts) and not any("." in text for text in texts)
-    decimal = "," if comma else "."
+    decimal = "," if "," in "".join(texts) and "." not in "".join(texts) else "."
     found = np.empty(len(cells))
     for row, cell in enumerate(plain):
         if isinstance(cell, str):
@@ -263,7 +231,7 @@ class MemorySource:
     matrices: bool = False
     """Whether numbers after x and y count the columns of matrices, each of which is a body."""
     units: list[str] = field(default_factory=list)
-    """Their units; empty where none are known."""
+    """Their units, as in a row below the names; empty where none are known."""
 
     def __post_init__(self) -> None:
         for name, column in zip(self.names, self.columns, strict=True):
@@ -292,7 +260,7 @@ class MemorySource:
         return form_of(self.columns[column])
 
     def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
-        """Read columns."""
+        """Read the columns that a layout names; of the `head` no more than the first rows."""
         if not self.rows:
             raise self.error("holds no rows of data")
         taken = slice(TABLE.first_rows if head else None)
@@ -305,10 +273,8 @@ class MemorySource:
             for at in wanted.numbers:
                 values = columns[at] - origin if origin and at == wanted.clock else columns[at]
                 numbers[at] = as_numbers(values, wanted.names[at])
-            readers = [StampReader() for _ in wanted.stamps]
+            readers = [StampReader(zoned=at in self.zoned) for at in wanted.stamps]
             ticks = list(map(as_ticks, (columns[at] for at in wanted.stamps), readers))
-            for at, reader in zip(wanted.stamps, readers, strict=True):
-                reader.zoned |= at in self.zoned
             if wanted.stamps:
                 numbers[wanted.stamps[0]], first = clock_of_stamps(ticks, None)
                 origin, calendar = first or 0, calendar_of(readers)

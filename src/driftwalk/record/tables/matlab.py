@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, damaged_as
 from driftwalk.record.column_names import quantity_of
-from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
+from driftwalk.record.containers import Hdf5Contents, opened_hdf5, text_of
 from driftwalk.record.tables.in_memory import MemorySource, Values, objects
 from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, read_old, refuse_many
 
@@ -62,12 +62,7 @@ def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
     elif start == OLD:
         with damaged_as("as a MATLAB file", path):
             content = read_old(path)
-        inside = {  # the name of an opaque object
-            name: text_of(value["s0"].ravel()[0])
-            for name, value in content.items()
-            if _is_opaque(value)
-        }
-        yield {inside.get(name) or name: _old_value(value) for name, value in content.items()}
+        yield {_own_name(value) or name: _old_value(value) for name, value in content.items()}
     else:
         raise FormatError("is no MATLAB file of version 5 or 7.3")
 
@@ -75,6 +70,11 @@ def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
 def _is_opaque(value: Any) -> bool:
     names = getattr(getattr(value, "dtype", None), "names", None)
     return names is not None and {"s0", "s1", "s2"} <= set(names)
+
+
+def _own_name(value: Any) -> str:
+    """Return the name that stands in an opaque object, ``""`` of any other value."""
+    return text_of(value["s0"].ravel()[0]) if _is_opaque(value) else ""
 
 
 def _old_value(value: Any) -> Value:
@@ -158,11 +158,7 @@ def _referred(contents: Hdf5Contents, entry: Any) -> list[str]:
     return [str(contents.file[reference].name) for reference in references]
 
 
-VECTORS: Final = "variables"
-"""Name of the table that the vectors of a file make."""
 _BODY: Final = "body"
-_OF_BODIES: Final = ("x", "y", "z", "theta")
-"""Quantities that a matrix may hold of several bodies."""
 _SAVED: Final = {
     "datetime": "posixtime(t)",
     "duration": "seconds(t)",
@@ -180,15 +176,9 @@ def matlab_tables(variables: dict[str, Value]) -> dict[str, MemorySource]:
     variables : dict
         Variables of a file.
     """
-    tables: dict[str, MemorySource] = {}
-    vectors = _of_fields(variables, "the vectors")
-    if vectors is not None:
-        tables[VECTORS] = vectors
-    for name, value in variables.items():
-        table = _table(value, f"'{name}'")
-        if table is not None:
-            tables[name] = table
-    return tables
+    tables = ((name, _table(value, f"'{name}'")) for name, value in variables.items())
+    found = [("variables", _of_fields(variables, "the vectors")), *tables]
+    return {name: table for name, table in found if table is not None}
 
 
 def only_matlab(variables: dict[str, Value]) -> str:
@@ -247,8 +237,8 @@ def _of_fields(fields: dict[str, Value], what: str) -> MemorySource | None:
     matrices = False
     for name, value in fields.items():
         several = isinstance(value, np.ndarray) and min(value.shape) > 1
-        if several and quantity_of(name) not in _OF_BODIES:
-            continue
+        if several and quantity_of(name) not in ("x", "y", "z", "theta"):
+            continue  # no other quantity is one of several bodies
         for number, column in enumerate(_columns(value, rows), start=1):
             # The number follows the quantity, before a unit.
             names.append(re.sub(r"^([A-Za-z]+)", rf"\g<1>{number}", name) if several else name)
@@ -284,15 +274,13 @@ def _row_count(fields: dict[str, Value]) -> int | None:
 def _columns(value: Value, rows: int) -> list[Values]:
     """Return the columns of a value that has a value for each row, [] of any other."""
     if isinstance(value, list):
-        if len(value) != rows or not all(isinstance(one, str) for one in value):
-            return []
-        return [objects(value)]
+        texts = len(value) == rows and all(isinstance(one, str) for one in value)
+        return [objects(value)] if texts else []
     if not isinstance(value, np.ndarray) or value.ndim != 2:
         return []
     if rows not in (value.shape if min(value.shape) > 1 else (value.size,)):
         return []
-    columns = value.T if value.shape[0] == rows else value
-    return [*columns]
+    return [*(value.T if value.shape[0] == rows else value)]
 
 
 def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
@@ -318,11 +306,7 @@ def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | 
 
 
 def _is_single(value: Value) -> bool:
-    return (
-        value is None
-        or isinstance(value, (str, Opaque))
-        or (isinstance(value, np.ndarray) and value.size <= 1)
-    )
+    return not isinstance(value, list) and getattr(value, "size", 1) <= 1
 
 
 def _single(value: Value) -> Any:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import ColumnMeaning, column_meaning, unit_of_name
 from driftwalk.record.raw import ReadOptions
+from driftwalk.record.space import Plane
 from driftwalk.record.tables.boxes import Box
-from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.vocabulary import ALLOWED, PARTS, ROOTS, SETPOINTS, UNITS, VARIANTS
+
+if TYPE_CHECKING:
+    from driftwalk.record.tables.text_source import TableSource
 
 _WORDS: Final = {"t": "time", "t+": "fraction of the time", "frame": "frame number", "w": "width"}
 _WORDS_MORE: Final = {"h": "height", "theta": "orientation", "body": "name of the body"}
@@ -63,6 +66,8 @@ class TableReading:
     bare: bool = True
     """Whether the names of positions are plain symbols, which mean metres next to seconds."""
     box: Box | None = None
+    planes: dict[str, Plane] = field(default_factory=dict)
+    """Body to the plane that it is laid into, of those in space."""
     parts: tuple[str, str, str] | None = None
     """Bodies that are parts of one: its middle, and those from and to which it points."""
     notes: list[str] = field(default_factory=list)
@@ -121,11 +126,9 @@ class NamedColumns:
                 stated = self.unit_of(index)
                 inferred = stated if stated in ALLOWED[quantity] else ""
                 unknown = known.unknown if known and not unit and known.quantity == quantity else ""
-                self.meanings = {
-                    other: meaning
-                    for other, meaning in self.meanings.items()
-                    if meaning.quantity != part and other != index
-                }
+                own = [at for at, one in self.meanings.items() if one.quantity == part]
+                for other in (index, *own):
+                    self.meanings.pop(other, None)
                 self.meanings[index] = ColumnMeaning(
                     part, unit or inferred, "", bool(known and known.bare), unknown, rank=-1
                 )
@@ -154,10 +157,7 @@ class NamedColumns:
                 f"{', '.join([*ALLOWED, _SKIP])}"
             )
         pairs = list(zip(names, self.below, strict=True))
-        written = [
-            names,
-            *([form.format(*pair) for pair in pairs] for form in ("{} [{}]", "{} {}")),
-        ]
+        written = [[form.format(*pair) for pair in pairs] for form in ("{}", "{} [{}]", "{} {}")]
         for text, unit in ((reference, ""), reference.rpartition(":")[::2]):
             places = [known.index(text) for known in written if text in known]
             if not places and text.isdecimal() and 1 <= int(text) <= len(names):
@@ -201,9 +201,8 @@ class NamedColumns:
                 left[body] = _OTHER_BODY
             if words[body] & VARIANTS and _base(body) in thetas:
                 left[body] = _SAME_BODY
-        for at, meaning in list(self.meanings.items()):
-            if meaning.body in left:
-                self.drop([at], left[meaning.body])
+        for body, why in left.items():
+            self.drop([at for at, one in self.meanings.items() if one.body == body], why)
         self._doubt(set(bodies) - set(left))
         named = [body for body in left if body in bodies]
         if named:
@@ -251,10 +250,9 @@ class NamedColumns:
         """Refuse positions, angles and times whose unit is not known."""
         options = self.options
         stated = options.length_unit is not None or options.metres_per_pixel is not None
-        unknown = {at: one for at, one in self.meanings.items() if one.unknown}
-        for at, meaning in unknown.items():
+        for at, meaning in list(self.meanings.items()):
             length = meaning.quantity in ("x", "y", "z")
-            if (length and stated) or self.lenient:
+            if not meaning.unknown or (length and stated) or self.lenient:
                 continue
             known = {(one.quantity, one.body) for one in self.meanings.values() if not one.unknown}
             counted = meaning.quantity == "t" and self.bodies_with("frame")
@@ -269,9 +267,8 @@ class NamedColumns:
         pairs = {
             at: one for at, one in self.meanings.items() if one.body in bodies.get(one.quantity, ())
         }
-        words = {one.ending for one in pairs.values()}
-        word = next(iter(words)) if len(words) == 1 else ""
-        if may_be_unit(word) and not any(one.unit for one in pairs.values()):
+        word, *more = {one.ending for one in pairs.values()} or [""]
+        if not more and may_be_unit(word) and not any(one.unit for one in pairs.values()):
             raise InputError(
                 self.no_unit(next(iter(pairs)), word)
                 + "; if it names the body, state the unit of its positions with `length_unit`"

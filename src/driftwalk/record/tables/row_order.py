@@ -16,9 +16,10 @@ from driftwalk.record.bad_row import is_number
 from driftwalk.record.cleaning.clean import LARGEST_SHARE, order_in_frame
 from driftwalk.record.column_names import quantity_of
 from driftwalk.record.raw import Array, TableLayout
-from driftwalk.record.tables.in_memory import TableSource, as_numbers, objects
+from driftwalk.record.tables.in_memory import as_numbers, objects
 from driftwalk.record.tables.named_columns import LEFT_OUT, TableReading
 from driftwalk.record.tables.stamps import RowError
+from driftwalk.record.tables.text_source import TableSource
 from driftwalk.record.text import Table
 from driftwalk.record.vocabulary import ALLOWED, UNITS
 
@@ -83,7 +84,7 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
                 f"no column is known to hold times or frames, but '{names[at]}' counts up and "
                 f"skips some: add {frame} if it counts frames, {time} if it holds times"
             )
-    apart = _tracks(table, counters, free, reading.body_column, (x, y))
+    apart = _tracks(table, counters, free, reading)
     if apart is not None:
         body, counter = apart
         what, columns = f"'{names[counter]}' counts frames", {"frame": names[counter]}
@@ -117,8 +118,7 @@ def _numbers(table: Table, column: int) -> Array | None:
         values = as_numbers(objects(table.labels[column]), "")
     except RowError:
         return None
-    numbers: Array = values[table.codes[column]]
-    return numbers
+    return np.asarray(values[table.codes[column]])
 
 
 def _skips_rows(values: Array) -> bool:
@@ -133,13 +133,10 @@ def _skips_rows(values: Array) -> bool:
 
 
 def _tracks(
-    table: Table,
-    counters: dict[int, Array],
-    free: list[int],
-    body: int | None,
-    place: tuple[int, int],
+    table: Table, counters: dict[int, Array], free: list[int], reading: TableReading
 ) -> tuple[int | None, int] | None:
     """Return the columns of body and frame of a table whose frames repeat or start over."""
+    body = reading.body_column
     found: list[tuple[int, int | None, int]] = []
     for frame, values in counters.items():
         whole = np.isfinite(values).all() and not (values % 1.0 != 0.0).any()
@@ -153,7 +150,7 @@ def _tracks(
                 found.append((bodies, other, frame))
         if not found and body is None:
             repeated = (np.diff(values) >= 0).all() and _leaps(
-                order_in_frame(values), *(table.numbers[at] for at in place)
+                order_in_frame(values), *(table.numbers[at] for at in _position(reading))
             )
             if repeated or _starts_over(values):
                 found.append((table.rows, None, frame))
@@ -237,35 +234,28 @@ def body_columns(
     numbers = {*place, *reading.numbers[:1]}
     taken = {*numbers, *reading.numbers, *reading.stamps, reading.body_column}
     # "min" next to "sec" names no body, and neither does a column of another known meaning.
-    free = tuple(
-        index
-        for index, name in enumerate(names)
-        if index not in taken
-        and UNITS.get(name.strip().lower()) not in ALLOWED["t"]
-        and quantity_of(name) in ("", "body")
-    )
+    named = {at: name for at, name in enumerate(names) if quantity_of(name) in ("", "body")}
+    units = {at: UNITS.get(name.strip().lower()) for at, name in named.items()}
+    free = tuple(at for at in named if at not in taken and units[at] not in ALLOWED["t"])
     # The first rows tell the columns of measurements, which have another value in every row.
-    wanted = TableLayout(
-        "", names, numbers=tuple(sorted(numbers)), texts=free, stamps=reading.stamps
-    )
+    wanted = TableLayout("", names, 0, tuple(sorted(numbers)), free, stamps=reading.stamps)
     head = source.read(wanted, head=True)
     free = tuple(index for index in free if 2 * len(head.labels[index]) <= max(head.rows, 2))
     table = source.read(replace(wanted, texts=free))
     times, x, y = (table.numbers[index] for index in (reading.clock, *place))
-    found = {
-        index: len(table.labels[index])
+    fitting = [
+        index
         for index in free
         if _are_names(table.labels[index], rows=table.rows)
         and _tells_apart(table.codes[index], times, x, y, in_order=in_order)
-    }
-    return [names[index] for index in sorted(found, key=lambda index: found[index])[:3]]
+    ]
+    return [names[at] for at in sorted(fitting, key=lambda at: len(table.labels[at]))[:3]]
 
 
 def _are_names(labels: list[str], *, rows: int) -> bool:
     """Whether the values of a column could name bodies that are seen several times each."""
-    if not 1 < len(labels) <= rows // 2:
-        return False
-    return not any(is_number(label) and float(label) % 1.0 for label in labels)
+    broken = (is_number(label) and float(label) % 1.0 for label in labels)
+    return 1 < len(labels) <= rows // 2 and not any(broken)
 
 
 def _tells_apart(codes: Codes, clock: Array, x: Array, y: Array, *, in_order: bool) -> bool:

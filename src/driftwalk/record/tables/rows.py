@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -23,21 +22,16 @@ from driftwalk.record.raw import (
     ReadOptions,
     TableLayout,
 )
-from driftwalk.record.space import Plane, body_in_plane, on_the_ground, plane_of_columns
+from driftwalk.record.space import body_in_plane, on_the_ground, plane_of_columns
 from driftwalk.record.tables.boxes import box_angle, box_centre
 from driftwalk.record.tables.columns import read_columns
-from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.tables.named_columns import TableReading
 from driftwalk.record.tables.row_order import body_columns, other_order
 from driftwalk.record.tables.stamps import DAY, count_days
+from driftwalk.record.tables.text_source import TableSource
 from driftwalk.record.text import Table
 from driftwalk.record.vocabulary import words
 
-NO_CLOCK = "the table has no column of times or frames: every row counts as a frame"
-NO_CLOCK_OF_EACH = (
-    "the table has no column of times or frames: every row of a body counts as a frame, from its "
-    "first on"
-)
 _FULL_TURN: Final = 6.3
 """A full turn in radians, with room for rounding."""
 _FLAGS: Final = {**dict.fromkeys(words("yes"), 1.0), **dict.fromkeys(words("no"), 0.0)}
@@ -63,7 +57,7 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
     FormatError
         When it has no positions, or a row or field cannot be read.
     """
-    reading, planes = columns_of(source, options)
+    reading = columns_of(source, options)
     labels = [column.name for column in reading.columns]
     if reading.clock is None:
         found = other_order(source, reading, labels)
@@ -84,15 +78,16 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
     if reading.clock is None:
         alone = codes is None or int(codes.max()) == 0
         clock = clock if alone or codes is None else order_in_body(codes)
-        notes.insert(0, NO_CLOCK if alone else NO_CLOCK_OF_EACH)
-    bodies, against = _bodies(table, reading, clock, planes, options)
+        counts = "counts as a frame" if alone else "of a body counts as a frame, from its first on"
+        notes.insert(0, f"the table has no column of times or frames: every row {counts}")
+    bodies, against = _bodies(table, reading, clock, options)
     if table.calendar == DAY:
         bodies = count_days(bodies, clock, codes)
     on_globe = any("lon" in places for places in reading.bodies.values())
     if on_globe:
         notes.append(on_the_ground(bodies))
     notes += _doubted_confidences(table, reading, options)
-    plane = next((one for one in planes if one is not None), None)
+    plane = next(iter(reading.planes.values()), None)
     bare = reading.bare_clock and bool(reading.numbers)
     return RawRecording(
         bodies=bodies,
@@ -115,10 +110,8 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
     )
 
 
-def columns_of(
-    source: TableSource, options: ReadOptions
-) -> tuple[TableReading, list[Plane | None]]:
-    """Return what the columns of a table are, and for each body the plane that it is laid into.
+def columns_of(source: TableSource, options: ReadOptions) -> TableReading:
+    """Return what the columns of a table are, and the planes that bodies are laid into.
 
     Parameters
     ----------
@@ -139,8 +132,11 @@ def columns_of(
         )
     try:
         reading = read_columns(source, options)
-        planes = [(of, plane_of_columns(of, options.up)) for of in reading.bodies.values()]
-        return reading, [plane if "x" in of else None for of, plane in planes]
+        for name, places in reading.bodies.items():
+            plane = plane_of_columns(places, options.up)
+            if plane is not None and "x" in places:
+                reading.planes[name] = plane
+        return reading
     except FormatError:
         raise
     except InputError as error:
@@ -176,15 +172,13 @@ def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Tabl
     flags = [at for at in reading.confidences if _holds_flags(source, at)]
     body = [] if reading.body_column is None else [reading.body_column]
     texts = tuple(dict.fromkeys([*body, *flags]))
-    wanted = TableLayout("", labels, 0, tuple(sorted(used - set(texts))), texts)
-    wanted = replace(wanted, clock=next(iter(reading.numbers), None), stamps=reading.stamps)
-    table = source.read(wanted)
+    numbers, clock = tuple(sorted(used - set(texts))), next(iter(reading.numbers), None)
+    table = source.read(TableLayout("", labels, 0, numbers, texts, clock, reading.stamps))
     for at, factor in reading.factors.items():
         table.numbers[at] *= factor
     for at in flags:
         said = [label.lower() for label in table.labels[at]]
-        unknown = set(said) - MISSING - set(_FLAGS)
-        if unknown:
+        if unknown := set(said) - MISSING - set(_FLAGS):
             what = f"'{min(unknown)}' in column '{labels[at]}'"
             raise source.error(f"{what} is neither a yes nor a no")
         marks = np.array([_FLAGS.get(word, np.nan) for word in said])
@@ -218,11 +212,9 @@ def _clock(table: Table, reading: TableReading) -> Array:
 
 def _unread_angles(reading: TableReading) -> list[str]:
     """Say which columns look like the orientation by their unit alone, where none was found."""
-    if any({"theta", "qw"} & set(places) for places in reading.bodies.values()):
-        return []
     unread = [column for column in reading.columns if not column.role]
     angles = [column.name for column in unread if column.unit in ANGLE_UNITS]
-    if not angles:
+    if not angles or any({"theta", "qw"} & set(places) for places in reading.bodies.values()):
         return []
     argument = argument_text("columns", {"theta": angles[0]})
     return [f"no orientation is read: add {argument} if that column holds it"]
@@ -246,18 +238,14 @@ def _numbers_the_rows(table: Table, column: int | None, clock: Array) -> bool:
     """Whether what seems to name the body counts up row by row, over more than one moment."""
     if column is None or table.rows < 3 or len(table.labels[column]) != table.rows:
         return False
-    first, *rest = table.labels[column]
+    first = table.labels[column][0]
     if not first.isdecimal() or (clock == clock[0]).all():
         return False
-    return all(label == str(int(first) + at) for at, label in enumerate(rest, start=1))
+    return table.labels[column][1:] == [str(int(first) + at) for at in range(1, table.rows)]
 
 
 def _bodies(
-    table: Table,
-    reading: TableReading,
-    clock: Array,
-    planes: list[Plane | None],
-    options: ReadOptions,
+    table: Table, reading: TableReading, clock: Array, options: ReadOptions
 ) -> tuple[list[RawBody], list[str]]:
     """Return the bodies, and what speaks against the planes that they were laid into."""
     column = reading.body_column
@@ -267,9 +255,9 @@ def _bodies(
             "with `columns`",
         )
     found, notes = {}, []
-    for (name, places), plane in zip(reading.bodies.items(), planes, strict=True):
-        if plane is not None:
-            body, against = body_in_plane(table.numbers, places, clock, plane)
+    for name, places in reading.bodies.items():
+        if name in reading.planes:
+            body, against = body_in_plane(table.numbers, places, clock, reading.planes[name])
         else:
             body, against = _body(table, reading, places, clock, options)
         body.name = name or "0"
@@ -318,9 +306,8 @@ def _body(
     turn = 2.0 * np.pi / ANGLE_UNITS[reading.angle_unit or "rad"]
     codes = None if reading.body_column is None else table.codes[reading.body_column]
     followed = box_angle(box, values, theta, codes, turn)
-    notes = []
-    if theta is not None and followed is not theta:
-        notes = ["the box looks the same after a half or quarter turn: its angle is unwrapped"]
+    note = "the box looks the same after a half or quarter turn: its angle is unwrapped"
+    notes = [note] if theta is not None and followed is not theta else []
     return RawBody("0", clock, *box_centre(box, values), followed), notes
 
 
@@ -363,13 +350,12 @@ def the_one_that_fits(
             fitting.append(name)
         except InputError as error:
             reasons.append(error.reason if isinstance(error, FormatError) else str(error))
+    if not fitting:
+        among = listed(list(tables))
+        raise FormatError(f"has no {what} with positions among {among}; {reasons[0]}")
     if len(fitting) > 1:
         choice = argument_text("sheet", fitting[0])
         raise FormatError(
             f"holds positions in more than one {what}, {listed(fitting)}: name it, as in {choice}"
-        )
-    if not fitting:
-        raise FormatError(
-            f"has no {what} with positions among {listed(list(tables))}; {reasons[0]}"
         )
     return tables[fitting[0]]

@@ -104,10 +104,10 @@ class StampReader:
     The first stamp decides the kind, and whether there is a zone; those after it have to agree.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, zoned: bool = False) -> None:
         self.kind = ""
         """``MOMENT`` or ``OF_DAY``, ``""`` as long as there was no stamp."""
-        self.zoned = False
+        self.zoned = zoned
 
     @property
     def calendar(self) -> str:
@@ -228,8 +228,7 @@ def _days(year: Ticks, month: Ticks, day: Ticks) -> tuple[Ticks, Bools]:
     months = np.where(wrong, 0, 12 * (year - 1970) + month - 1).astype("datetime64[M]")
     days = months.astype("datetime64[D]") + (day - 1)
     wrong |= days.astype("datetime64[M]") != months
-    since: Ticks = days.astype(np.int64)
-    return since, wrong
+    return np.asarray(days.astype(np.int64)), wrong
 
 
 def calendar_of(readers: list[StampReader]) -> str:

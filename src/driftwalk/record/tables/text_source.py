@@ -103,12 +103,8 @@ def read_header(
     raw = head.split(b"\n")
     stated = _DELIMITER_LINE.fullmatch(raw[0].decode("utf-8", "replace"))
     begin = 1 if stated else 0
-    filled = (
-        number
-        for number, line in enumerate(raw)
-        if number >= begin and line.strip() and not line.startswith(b"#")
-    )
-    if (at := next(filled, None)) is None:
+    rows = (number for number in range(begin, len(raw)) if raw[number].strip())
+    if (at := next((one for one in rows if not raw[one].startswith(b"#")), None)) is None:
         raise FormatError("the file is empty")
     lines = [decoded_line(line, number) for number, line in enumerate(raw[: at + 2], start=1)]
     separator = delimiter or (stated[1] if stated else detect_delimiter(lines[at : at + 2]))
@@ -267,15 +263,11 @@ def _holds_positions(
         reading = read_columns(source, options, lenient=True)
     except InputError:
         return False
-    columns = [
-        at
-        for places in reading.bodies.values()
-        for quantity, at in places.items()
-        if quantity != "theta"
-    ]
+    found = [one for places in reading.bodies.values() for one in places.items()]
+    columns = [at for quantity, at in found if quantity != "theta"]
     if any(_is_numeric(names[at]) for at in columns):
         return False  # a row of data
-    cells = [below[at] if at < len(below) else "" for at in columns]
+    cells = [below[at] for at in columns if at < len(below)]
     numeric = all(cell in MISSING or _is_numeric(cell) for cell in cells)
     return numeric and any(below)  # a body that is not seen yet has a row without a position
 
@@ -303,11 +295,10 @@ class TextSource:
     def _find_header(self, options: ReadOptions) -> None:
         """Take the first line that names positions for the header, with the units below it."""
         begin = self._skip - 1
-        stated = options.header_line is not None
-        count = 3 if stated else TABLE.heading_rows
+        count = TABLE.heading_rows if options.header_line is None else 3
         lines = header_rows(self._path, begin + count)[begin:]
         below = self._fields(lines[1:])
-        if stated:
+        if options.header_line is not None:
             if len(below) > 1 and (units := units_below(self.names, below[0], options)):
                 self.units, self._skip = units, begin + 2
             return
@@ -364,3 +355,7 @@ class TextSource:
         """Return an error about the header, or the file where it has none."""
         line = (self._skip or None) if self.has_header else None
         return FormatError(message + self._advice, line=line)
+
+
+TableSource = TextSource | MemorySource
+"""A table with one row per sample."""

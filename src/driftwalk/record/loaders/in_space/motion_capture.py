@@ -78,11 +78,8 @@ class OptiTrackLoader:
         times = [axis for axis in axes if axis in ("Time", "Time (Seconds)")]
         unit = UNITS.get(settings.get("Length Units", "").lower(), "")
         if settings.get("Length Units") and unit not in LENGTH_UNITS:
-            raise FormatError(
-                f"the unit of length is '{settings['Length Units']}': export in meters or "
-                "millimeters",
-                line=1,
-            )
+            what = f"the unit of length is '{settings['Length Units']}'"
+            raise FormatError(f"{what}: export in meters or millimeters", line=1)
         rate = settings.get("Export Frame Rate") or settings.get("Capture Frame Rate")
         titled = enumerate(zip(names, quantities, axes, strict=True), start=1)
         labels = [" ".join(filter(None, one)) or str(number) for number, one in titled]
@@ -95,9 +92,8 @@ class OptiTrackLoader:
             length_unit=unit,
             frame_rate_hz=None if times or rate is None else _rate(rate, "the setting", 1),
         )
-        if kind != "Rigid Body":
-            note = "no rigid bodies: each marker is read as a body, without orientation"
-            recording.notes.append(note)
+        note = "no rigid bodies: each marker is read as a body, without orientation"
+        recording.notes += [note] if kind == "Marker" else []
         return recording
 
 
@@ -148,7 +144,7 @@ class ViconLoader:
             raise FormatError("the file ends before its first row of data")
         section = lines[0].strip(", ")
         if section not in _READ:
-            known = f"{', '.join(_READ[:-1])} or {_READ[-1]}"
+            known = "Objects, Segments or Trajectories"
             raise FormatError(f"begins with the section '{section}': export {known}", line=1)
         rate = _rate(lines[1].strip(", "), "the frame rate", 2)
         rows = [split_fields(line, ",") for line in lines[2 : _LINES + 1]]
@@ -167,11 +163,9 @@ class ViconLoader:
         }
         lengths = {units[column] for one in bodies.values() for column in one.position}
         if len(lengths) != 1 or not lengths <= {*LENGTH_UNITS, ""}:
-            raise FormatError(
-                f"the units of the positions are {', '.join(sorted(lengths))}: expected one, mm or "
-                "m",
-                line=_LINES,
-            )
+            found = ", ".join(sorted(lengths))
+            what = f"the units of the positions are {found}: expected one, mm or m"
+            raise FormatError(what, line=_LINES)
         labels = [f"{name} {axis}".strip() for name, axis in zip(names, axes, strict=True)]
         layout, unit = TableLayout(",", labels, _LINES, clock=0), lengths.pop()
         facts: dict[str, Any] = {"length_unit": unit, "frame_rate_hz": rate}
@@ -181,10 +175,8 @@ class ViconLoader:
             wrong = header_rows(path, error.line)[-1:] if error.line else []
             if not any(line.strip(", \r") in (*_READ, *_OTHERS) for line in wrong):
                 raise
-            raise FormatError(
-                "another section begins here: keep one section in a file, or export one alone",
-                line=error.line,
-            ) from error
+            what = "another section begins here: keep one section in a file, or export one alone"
+            raise FormatError(what, line=error.line) from error
 
 
 def _of_vicon(name: str, columns: dict[str, int], units: list[str]) -> SpaceColumns:

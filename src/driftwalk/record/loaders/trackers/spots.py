@@ -20,9 +20,9 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.clean import number_codes, split_bodies
 from driftwalk.record.column_names import unit_of_name
+from driftwalk.record.containers import Frame, Hdf5Contents, frame_in, names_in, opened_hdf5
 from driftwalk.record.loaders.plain import numbers_by_name
 from driftwalk.record.raw import LENGTH_UNITS, Array, Marks, RawBody, RawRecording, ReadOptions
-from driftwalk.record.stores.hdf5 import Frame, Hdf5Contents, frame_in, names_in, opened_hdf5
 from driftwalk.record.tables.text_source import first_names, first_row
 from driftwalk.record.text import header_rows, open_binary
 from driftwalk.schema.stores.netcdf import HDF5, file_start
@@ -164,10 +164,9 @@ class TrackMateXmlLoader:
         tracks = {name: ends for name, ends in contents.edges.items() if ends and name in kept}
         if not tracks:
             raise FormatError("no track is kept: track the spots in TrackMate, and save")
-        bodies = [
-            _body(name, spots, ends, clock=4 if clock_unit == "frame" else 3)
-            for name, ends in sorted(tracks.items(), key=lambda entry: (len(entry[0]), entry[0]))
-        ]
+        clock = 4 if clock_unit == "frame" else 3
+        names = sorted(tracks, key=lambda name: (len(name), name))
+        bodies = [_body(name, spots, tracks[name], clock=clock) for name in names]
         outside = len(spots) - len(np.unique(np.concatenate([*map(np.array, tracks.values())])))
         length = stated_unit(contents.units.get("spatialunits", ""))
         notes = [OUTSIDE.format(outside)] if outside else []
@@ -211,7 +210,6 @@ def _refuse_doctype(*_: object) -> None:
 OF_TRACKPY: Final = ("x", "y", "frame", "particle")
 OWN: Final = frozenset({"mass", "size", "ecc", "signal", "raw_mass", "ep"})
 """Columns that trackpy's features have; two of them tell its tables from others."""
-OF_FRAME: Final = "Frame_"
 
 
 class TrackpyLoader:
@@ -233,23 +231,21 @@ class TrackpyLoader:
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every particle; rows that are linked to none are left out."""
-        is_hdf5 = file_start(path) == HDF5
-        x, y, frame, particle = (_of_store(path) if is_hdf5 else _of_csv(path)).values()
+        if file_start(path) == HDF5:
+            columns = _of_store(path)
+        else:
+            columns = numbers_by_name(path, used=_places(first_row(path)))
+        x, y, frame, particle = columns.values()
         loose = "features that are linked to no particle, and left out: {}"
         what = "no feature is linked to a particle", loose
         return _of_numbered(RawBody("", frame, x, y), particle, what, length_unit="px")
 
 
-def _of_csv(path: Path) -> dict[str, Array]:
-    names = first_row(path)
-    return numbers_by_name(path, names, _places(names))
-
-
 def _of_store(path: Path) -> dict[str, Array]:
     with opened_hdf5(path) as contents:
         groups = [str(name) for name in contents.file]
-        frames = [name for name in groups if name.removeprefix(OF_FRAME).isdecimal()]
-        frames.sort(key=lambda name: int(name.removeprefix(OF_FRAME)))
+        numbered = [name for name in groups if name.removeprefix("Frame_").isdecimal()]
+        frames = sorted(numbered, key=lambda name: int(name.removeprefix("Frame_")))
         if frames:
             parts = [_columns(frame_in(contents, name)) for name in frames]
             return {name: np.concatenate([part[name] for part in parts]) for name in OF_TRACKPY}
@@ -260,7 +256,7 @@ def _only_table(contents: Hdf5Contents, groups: list[str]) -> Frame:
     """Return the table of features; of several, the one of linked ones."""
     tables = {name: frame_in(contents, name) for name in groups}
     linked = [name for name, table in tables.items() if ("particle",) in table.columns]
-    chosen = [*tables] if len(tables) == 1 else linked
+    chosen = groups if len(groups) == 1 else linked
     if len(chosen) != 1:
         raise FormatError(
             f"holds the tables {', '.join(groups) or 'none'}, of which {len(linked)} have a column "

@@ -30,8 +30,8 @@ from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions, Tabl
 from driftwalk.record.tables.text_source import first_line, first_lines
 from driftwalk.record.text import Table, blocks_of, read_head, read_table
 
-OLD = ["frame", "x (image)", "y (image)", "x (world)", "y (world)", "area", "orientation"]
-OLD = [*OLD, "compactness", "time stamp"]
+PARTICLE = ["x (image)", "y (image)", "x (world)", "y (world)", "area", "orientation"]
+OLD = ["frame", *PARTICLE, "compactness", "time stamp"]
 NEW = ["frame", "x", "y"]
 _FILE_NAME = re.compile(r"(?:.*_)?(?:track_?)?(\d{8})\.(?:txt|csv)")
 
@@ -64,8 +64,7 @@ class SwisTrackTracksLoader:
         if len({len(one) for one in tracks}) > 1:
             raise FormatError("the folder mixes track files of two SwisTrack versions")
         if len(tracks[0]) == len(NEW):
-            bodies = [RawBody(name, *one) for name, one in tables.items()]
-            return RawRecording(bodies, "frame", "px")
+            return RawRecording([RawBody(at, *tables[at]) for at in tables], "frame", "px")
         timed = options.frame_rate_hz is None and all((one[8] >= 0).all() for one in tracks)
         world = _in_world([one[at] for one in tracks for at in (3, 4)], options)
         used = (8 if timed else 0, *((3, 4) if world else (1, 2)), 6)
@@ -80,9 +79,8 @@ def _in_world(places: Sequence[Array], options: ReadOptions) -> bool:
 
 def _recording(bodies: list[RawBody], clock_unit: str, *, world: bool) -> RawRecording:
     """Return bodies in the world or the image; angles are measured in the image in either case."""
-    raw = RawRecording(bodies, clock_unit, "m" if world else "px", theta_axis="down")
-    raw.y_axis = "up" if world else "down"
-    return raw
+    unit, up = ("m", "up") if world else ("px", "down")
+    return RawRecording(bodies, clock_unit, unit, y_axis=up, theta_axis="down")
 
 
 def _of_particles(
@@ -124,7 +122,7 @@ def _track_files(folder: Path) -> list[Path]:
     return sorted(file for file in folder.iterdir() if _FILE_NAME.fullmatch(file.name))
 
 
-PARTICLES = ["frame", "time", *OLD[1:8]]
+PARTICLES = ["frame", "time", *PARTICLE, "compactness"]
 
 
 class SwisTrackParticlesLoader:
@@ -149,10 +147,8 @@ class SwisTrackParticlesLoader:
         rows = (_times(table) if timed else numbers[0], *(numbers[at] for at in (2, 3, 4, 5, 7)))
         raw = _of_particles(rows, order, names, options)
         raw.clock_unit = "s" if timed else "frame"
-        note = (
-            "particles.csv holds no identities: bodies are distinguished by their order in a frame"
-        )
-        raw.notes = [note] if len(names) > 1 else []
+        note = "holds no identities: bodies are distinguished by their order in a frame"
+        raw.notes = [f"particles.csv {note}"] if len(names) > 1 else []
         return raw
 
 
@@ -167,8 +163,7 @@ def _times(table: Table) -> Array:
         raise FormatError(
             f"a time stamp is not an ISO date ({error}); give `frame_rate` to use frame numbers"
         ) from error
-    seconds: Array = stamps[table.codes[1]]
-    return seconds
+    return np.asarray(stamps[table.codes[1]])
 
 
 class SwisTrackNmeaLoader:
@@ -189,13 +184,11 @@ class SwisTrackNmeaLoader:
         frame = values[0]
         if not frame.size:
             raise FormatError("holds no $PARTICLE")
-        order = order_in_frame(frame)
-        labels, codes = np.unique(ids, return_inverse=True)
         # Some senders give every particle the same id: then only their order tells them apart.
         repeated = np.unique(np.stack([frame, ids]), axis=1).shape[1] < frame.size
-        names = [str(index) for index in (range(int(order.max()) + 1) if repeated else labels)]
-        of_row = order if repeated else codes.astype(np.int32)
-        raw = _of_particles(values, of_row, names, options)
+        distinct, codes = np.unique(order_in_frame(frame) if repeated else ids, return_inverse=True)
+        names = [*map(str, distinct.tolist())]
+        raw = _of_particles(values, codes.astype(np.int32), names, options)
         note = "ids repeat within a frame: bodies are distinguished by their order in the frame"
         raw.notes = [note] if repeated else []
         return raw

@@ -61,10 +61,8 @@ class AnimalTALoader:
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
         names = first_line(head).split(";")
-        known = names[:2] == ["Frame", "Time"] and (
-            tuple(names[:6]) == ANIMALTA or any(map(_PLACE.fullmatch, names[2:]))
-        )
-        return 0.95 if known else 0.0
+        beside = names[:2] == ["Frame", "Time"] and any(map(_PLACE.fullmatch, names))
+        return 0.95 if beside or tuple(names[:6]) == ANIMALTA else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every target."""
@@ -76,16 +74,15 @@ class AnimalTALoader:
             targets = table.codes[3], [f"Ind{label}" for label in table.labels[3]]
             named = codes_in_arenas((table.codes[2], table.labels[2]), targets)
             frame, time, x, y = (table.numbers[column] for column in (0, 1, 4, 5))
+            bodies = [RawBody("", frame, x, y)]
         else:
             bodies, columns = side_by_side(path, _PLACE, ";")
             frame, time, named = columns["Frame"], columns["Time"], None
         rate = None if options.frame_rate_hz is not None else _rate_of_frames(frame, time)
         timed = rate is None and options.frame_rate_hz is None
-        clock = time if timed else frame
-        if named is None:
-            bodies = [replace(one, clock=clock) for one in bodies]
-        else:
-            bodies = split_bodies(RawBody("", clock, x, y), *named)
+        bodies = [replace(one, clock=time if timed else frame) for one in bodies]
+        if named is not None:
+            bodies = split_bodies(bodies[0], *named)
         return RawRecording(bodies, "s" if timed else "frame", "px", frame_rate_hz=rate)
 
 
@@ -250,9 +247,6 @@ def _area_widths(path: Path) -> dict[str, float]:
     return dict(zip(names, numbers[::4], strict=False))
 
 
-YUPI_AXES: Final = ("x", "y", "z")
-
-
 class YupiLoader:
     """One body; seconds, and no unit of length."""
 
@@ -281,7 +275,7 @@ class YupiLoader:
         try:
             skip = int(rows[0][1]) if second else 2
             name, _, dimensions = rows[1 if second else 0]
-            axes = YUPI_AXES[: int(dimensions)]
+            axes = "xyz"[: int(dimensions)]
             further = rows[5] if second else []
         except (ValueError, IndexError) as error:
             raise FormatError(f"the rows of settings are damaged: {error}") from error

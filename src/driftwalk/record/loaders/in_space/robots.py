@@ -1,4 +1,9 @@
-"""ROS bags: poses of one topic or several, at the times of their headers."""
+"""Poses as robots log them: ROS bags, EuRoC's ground truth, TUM's text of trajectories.
+
+Bags: poses of one topic or several, at the times of their headers. EuRoC: CSV with ``p_RS_R_x [m]``
+and ``q_RS_w []``, a clock of nanoseconds. TUM: ``timestamp tx ty tz qx qy qz qw``, blanks between,
+seconds and metres.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +13,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import accumulate
+from itertools import accumulate, takewhile
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,8 +22,12 @@ import numpy as np
 from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.core.files.bounded import MIB, read_bounded
 from driftwalk.core.text.json_text import MOST_LEVELS
-from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
+from driftwalk.record.column_names import unit_of_name
+from driftwalk.record.loaders.plain import described
+from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.space import PARTS, SpaceTrack, lay_flat, plane_of
+from driftwalk.record.tables.text_source import first_line, first_lines, first_row, is_numeric_row
+from driftwalk.record.text import header_rows
 
 Pose = tuple[str, Any, str, tuple[float, ...]]
 """One body in one message: its name, the stamp of its header, None where the message has none, the
@@ -95,8 +104,7 @@ class RosLoader:
             clock = np.array([stamp - origin for stamp, _ in samples], dtype=np.float64)
             values = np.array([pose for _, pose in samples], dtype=np.float64)
             name = body if times[body] == 1 else f"{topic.strip('/')}/{body}"
-            turns = Turns(values[:, 3:], QUATERNION)
-            bodies.append(SpaceTrack(name, clock, values[:, :3], turns))
+            bodies.append(SpaceTrack(name, clock, values[:, :3], values[:, 3:]))
         flat = lay_flat(bodies, plane)
         if recorded:
             flat.notes.append(
@@ -104,10 +112,8 @@ class RosLoader:
                 "recorded, which is later"
             )
         if len(parents) > 1:
-            flat.notes.append(
-                f"the poses are in different frames, {', '.join(sorted(parents))}: compare bodies "
-                "of one frame only"
-            )
+            what = f"the poses are in different frames, {', '.join(sorted(parents))}"
+            flat.notes.append(f"{what}: compare bodies of one frame only")
         return replace(flat, clock_unit="ns", clock_origin=origin, length_unit="m")
 
 
@@ -152,10 +158,8 @@ def _choose(connections: list[Any], topic: str | None) -> list[Any]:
     topics = list(dict.fromkeys(one.topic for one in usable))
     if not topics:
         found = ", ".join(sorted({one.msgtype for one in connections})[:8]) or "no topics"
-        raise FormatError(
-            f"has no topic of poses, only {found}; read are "
-            f"{', '.join(name.rpartition('/')[2] for name in READ)}"
-        )
+        known = ", ".join(name.rpartition("/")[2] for name in READ)
+        raise FormatError(f"has no topic of poses, only {found}; read are {known}")
     wanted = [name.strip() for name in topic.split(",")] if topic is not None else topics
     if (len(wanted) > 1 and topic is None) or not set(wanted) <= set(topics):
         shown = ", ".join(
@@ -182,4 +186,72 @@ def _collect(reader: Any, chosen: list[Any]) -> tuple[_Tracks, set[str], int]:
     return tracks, parents, recorded
 
 
-LOADER = RosLoader()
+_START: Final = re.compile(r"#\s*timestamp\b[^,]*(,\s*p_\w*[xyz]\b[^,]*){3}")
+_PART: Final = re.compile(r"([pq])_(?:[A-Za-z]+_)*([wxyz])\s*(?:\[.*\])?")
+
+
+class EurocLoader:
+    """One body; velocities and biases that follow are not read."""
+
+    name = "euroc"
+    description = "EuRoC ground truth CSV (#timestamp [ns], p_RS_R_x [m], …, q_RS_w, …; z up)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header."""
+        return 0.9 if _START.match(first_line(head)) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the one body; its whole nanoseconds stay exact."""
+        names = [name.lstrip("# ") for name in first_row(path)]
+        matches = filter(None, map(_PART.fullmatch, names))
+        columns = {"".join(one.groups()).removeprefix("p"): one[0] for one in matches}
+        lacking = [axis for axis in "xyz" if axis not in columns]
+        if lacking:
+            raise FormatError(f"the header names no column of p_…_{lacking[0]}", line=1)
+        wanted = ("x", "y", "z", *(PARTS if set(PARTS) <= set(columns) else ()))
+        used = {part: columns[part] for part in wanted}
+        stated = unit_of_name(names[0])
+        unit = stated if stated in CLOCK_UNITS else "ns"
+        return _in_space(path, options, used, TableLayout(",", names, 1), unit)
+
+
+def _in_space(
+    path: Path, options: ReadOptions, columns: dict[str, str], layout: TableLayout, unit: str
+) -> RawRecording:
+    """Return the one body, whose clock is in the first column and has that unit."""
+    named = {"t": f"{layout.names[0]}:{unit}", **columns}
+    stated = replace(options, up=options.up or "z")
+    return described(path, stated, named, layout, length_unit="m", y_axis="up")
+
+
+_TUM: Final = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
+
+
+class TumLoader:
+    """One body, with its time stamps as they are."""
+
+    name = "tum"
+    description = "TUM trajectory (timestamp tx ty tz qx qy qz qw; s, m; z up)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise eight numbers of which the last four make a unit quaternion."""
+        lines = first_lines(head, 20)
+        rows = [line.split() for line in lines if not line.startswith("#")][:2]
+        named = any(line.lstrip("# ").split() == _TUM for line in lines if line[:1] == "#")
+        if not rows or not all(len(row) == len(_TUM) and is_numeric_row(row) for row in rows):
+            return 0.0
+        try:
+            lengths = [math.hypot(*map(float, row[4:])) for row in rows]
+        except ValueError:
+            lengths = [0.0]
+        return 0.9 if named or all(abs(one - 1.0) < 0.02 for one in lengths) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the one body."""
+        comments = takewhile(lambda line: line.startswith("#"), header_rows(path, 20))
+        layout = TableLayout(" ", _TUM, len([*comments]))
+        columns = dict(zip(("x", "y", "z", *PARTS), _TUM[1:], strict=True))
+        return _in_space(path, options, columns, layout, "s")
+
+
+LOADERS = (RosLoader(), EurocLoader(), TumLoader())
