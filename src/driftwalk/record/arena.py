@@ -109,14 +109,13 @@ def place_arena(
 
 
 def _length(text: str, whole: str) -> float:
+    where = argument_text("tank", whole)
     try:
         value = parse_quantity(text, "m")
     except ValueError as error:
-        raise InputError(
-            f"{argument_text('tank', whole)}: '{text}' is not a length ({error})"
-        ) from error
+        raise InputError(f"{where}: '{text}' is not a length ({error})") from error
     if not (np.isfinite(value) and value > 0):
-        raise InputError(f"{argument_text('tank', whole)}: a size must be above zero")
+        raise InputError(f"{where}: a size must be above zero")
     return value
 
 
@@ -126,9 +125,8 @@ def _center(text: str, whole: str) -> tuple[float, float] | None:
     try:
         x, y = (float(part) for part in text.split(","))
     except ValueError as error:
-        raise InputError(
-            f"{argument_text('tank', whole)}: '@{text}' is not a centre @X,Y in metres"
-        ) from error
+        where = argument_text("tank", whole)
+        raise InputError(f"{where}: '@{text}' is not a centre @X,Y in metres") from error
     return x, y
 
 

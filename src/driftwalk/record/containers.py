@@ -5,9 +5,9 @@ PyTables. The fixed format keeps blocks of columns of one type each, the table f
 array. The names of the columns are arrays in the first, and pickled lists in attributes in the
 second.
 
-A pickle is a program, and it may call any function by name. Of those here nothing is executed: the
-few names that NumPy's arrays need are answered by functions of this module, and `find_class`
-refuses every other one.
+A pickle is a program, and it may call any function by name. None is executed here: the few names
+that NumPy's arrays need are answered by functions of this module, and `find_class` refuses every
+other one.
 """
 
 from __future__ import annotations

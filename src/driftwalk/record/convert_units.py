@@ -192,10 +192,8 @@ def _length_scale(raw: RawRecording, options: ReadOptions) -> tuple[float, bool]
     if unit is not None and unit not in (*LENGTH_UNITS, "px"):
         raise InputError(f"`length_unit` is one of {', '.join(LENGTH_UNITS)}, px; got '{unit}'")
     if unit is not None and raw.length_unit not in ("", "px", unit):
-        raise InputError(
-            f"{argument_text('length_unit', unit)} contradicts the file, whose positions are in "
-            f"{raw.length_unit}"
-        )
+        stated = argument_text("length_unit", unit)
+        raise InputError(f"{stated} contradicts the file, whose positions are in {raw.length_unit}")
     unit = _unit(raw.length_unit, raw.bare_length_is_si, options)
     if unit == "px":
         return _positive(options.metres_per_pixel, "metres_per_pixel"), True

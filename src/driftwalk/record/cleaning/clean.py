@@ -80,12 +80,11 @@ def refuse_several_bodies(body: RawBody, apart: Array, columns: BodyColumns | No
         Naming these columns.
     """
     times = 1 + int((body.clock[1:] != body.clock[:-1]).sum())
-    if apart.size <= LARGEST_SHARE * times:
-        return
-    raise InputError(
-        f"body '{body.name}' is in several places at {apart.size} of {times} times, first at "
-        f"{apart[0]:.6g} s; {_advice(columns)}"
-    )
+    if apart.size > LARGEST_SHARE * times:
+        raise InputError(
+            f"body '{body.name}' is in several places at {apart.size} of {times} times, first at "
+            f"{apart[0]:.6g} s; {_advice(columns)}"
+        )
 
 
 def _advice(columns: BodyColumns | None) -> str:

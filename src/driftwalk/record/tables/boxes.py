@@ -17,7 +17,7 @@ from driftwalk.record.raw import Array, ReadOptions, TableLayout
 from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS, words
 
 if TYPE_CHECKING:
-    from driftwalk.record.tables.text_source import TableSource
+    from driftwalk.record.tables.in_memory import TableSource
 
 FORMS: Final = ("xyxy", "xywh", "cxcywh", "none")
 _STATED: Final = re.compile(

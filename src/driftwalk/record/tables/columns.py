@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
 from driftwalk.record.raw import LENGTH_UNITS, MISSING, ReadOptions
 from driftwalk.record.tables.boxes import find_box
+from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.tables.named_columns import (
     ColumnReading,
     NamedColumns,
@@ -21,9 +22,6 @@ from driftwalk.record.tables.named_columns import (
 )
 from driftwalk.record.tables.stamps import OF_DAY
 from driftwalk.record.vocabulary import ALLOWED, FRONT, LENGTHS, MIDDLE, PARTS, REAR
-
-if TYPE_CHECKING:
-    from driftwalk.record.tables.text_source import TableSource
 
 _ON_GLOBE: Final = ("lon", "lat")
 

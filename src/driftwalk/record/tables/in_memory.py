@@ -1,4 +1,4 @@
-"""Tables in memory: columns with numbers, names or time stamps.
+"""Tables: their interface to the reader, and columns in memory with numbers, names or time stamps.
 
 Data frames, arrays, a mapping of columns.
 """
@@ -11,7 +11,7 @@ import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -46,6 +46,37 @@ class TablePolicy(NamedTuple):
 
 
 TABLE: Final = TablePolicy()
+
+
+class TableSource(Protocol):
+    """A table with one row per sample."""
+
+    names: list[str]
+    """Names of the columns, ``""`` where there is none."""
+    units: list[str]
+    """Units in a row below the names; empty where there is no such row."""
+    has_header: bool
+    """Whether the columns have names."""
+    matrices: bool
+    """Whether numbers after x and y count the columns of matrices, each of which is a body."""
+
+    def sample(self) -> list[list[str]]:
+        """Return the first rows as texts."""
+
+    def stamps(self, column: int, /) -> StampForm | None:
+        """Return how the first time stamp of a column is written, None where it has none."""
+
+    def read(self, wanted: TableLayout, /, *, head: bool = False) -> Table:
+        """Read the columns that a layout names; of the `head` no more than the first rows.
+
+        Raises
+        ------
+        FormatError
+            When a row or a field cannot be read.
+        """
+
+    def error(self, message: str, /) -> FormatError:
+        """Return an error about the header, or the table where it has none."""
 
 
 Values = npt.NDArray[Any]
@@ -231,7 +262,7 @@ class MemorySource:
     matrices: bool = False
     """Whether numbers after x and y count the columns of matrices, each of which is a body."""
     units: list[str] = field(default_factory=list)
-    """Their units, as in a row below the names; empty where none are known."""
+    """Their units; empty where none are known."""
 
     def __post_init__(self) -> None:
         for name, column in zip(self.names, self.columns, strict=True):
@@ -260,7 +291,7 @@ class MemorySource:
         return form_of(self.columns[column])
 
     def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
-        """Read the columns that a layout names; of the `head` no more than the first rows."""
+        """Read columns."""
         if not self.rows:
             raise self.error("holds no rows of data")
         taken = slice(TABLE.first_rows if head else None)

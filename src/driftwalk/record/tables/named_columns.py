@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import ColumnMeaning, column_meaning, unit_of_name
 from driftwalk.record.raw import ReadOptions
 from driftwalk.record.space import Plane
 from driftwalk.record.tables.boxes import Box
+from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.vocabulary import ALLOWED, PARTS, ROOTS, SETPOINTS, UNITS, VARIANTS
-
-if TYPE_CHECKING:
-    from driftwalk.record.tables.text_source import TableSource
 
 _WORDS: Final = {"t": "time", "t+": "fraction of the time", "frame": "frame number", "w": "width"}
 _WORDS_MORE: Final = {"h": "height", "theta": "orientation", "body": "name of the body"}
@@ -118,10 +116,8 @@ class NamedColumns:
             first, *more = self._references(reference, quantity)
             for part, (index, unit) in zip((quantity, "t+"), (first, *more), strict=False):
                 if unit and unit not in ALLOWED[quantity]:
-                    raise InputError(
-                        f"{argument_text('columns', {quantity: reference})}: '{unit}' is not a "
-                        f"unit of {quantity}"
-                    )
+                    where = argument_text("columns", {quantity: reference})
+                    raise InputError(f"{where}: '{unit}' is not a unit of {quantity}")
                 known = self.meanings.get(index)
                 stated = self.unit_of(index)
                 inferred = stated if stated in ALLOWED[quantity] else ""
@@ -150,12 +146,9 @@ class NamedColumns:
             return [self._find(part, quantity) for part in parts]
 
     def _find(self, reference: str, quantity: str) -> tuple[int, str]:
-        names = self.names
+        names, where = self.names, argument_text("columns", {quantity: reference})
         if quantity not in ALLOWED and quantity != _SKIP:
-            raise InputError(
-                f"{argument_text('columns', {quantity: reference})}: unknown quantity; name "
-                f"{', '.join([*ALLOWED, _SKIP])}"
-            )
+            raise InputError(f"{where}: unknown quantity; name {', '.join([*ALLOWED, _SKIP])}")
         pairs = list(zip(names, self.below, strict=True))
         written = [[form.format(*pair) for pair in pairs] for form in ("{}", "{} [{}]", "{} {}")]
         for text, unit in ((reference, ""), reference.rpartition(":")[::2]):
@@ -164,10 +157,7 @@ class NamedColumns:
                 places = [int(text) - 1]
             if places:
                 return places[0], UNITS.get(unit.lower(), unit)
-        raise InputError(
-            f"{argument_text('columns', {quantity: reference})}: no such column; the file has "
-            f"{len(names)}: {shown(names)}"
-        )
+        raise InputError(f"{where}: no such column; the file has {len(names)}: {shown(names)}")
 
     def bodies_with(self, quantity: str = "x") -> dict[str, int]:
         """Return the names of the bodies that have a quantity, and its column."""

@@ -25,10 +25,10 @@ from driftwalk.record.raw import (
 from driftwalk.record.space import body_in_plane, on_the_ground, plane_of_columns
 from driftwalk.record.tables.boxes import box_angle, box_centre
 from driftwalk.record.tables.columns import read_columns
+from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.tables.named_columns import TableReading
 from driftwalk.record.tables.row_order import body_columns, other_order
 from driftwalk.record.tables.stamps import DAY, count_days
-from driftwalk.record.tables.text_source import TableSource
 from driftwalk.record.text import Table
 from driftwalk.record.vocabulary import words
 

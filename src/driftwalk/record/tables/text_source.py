@@ -355,7 +355,3 @@ class TextSource:
         """Return an error about the header, or the file where it has none."""
         line = (self._skip or None) if self.has_header else None
         return FormatError(message + self._advice, line=line)
-
-
-TableSource = TextSource | MemorySource
-"""A table with one row per sample."""
