@@ -5,10 +5,14 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields
-from typing import Any, NamedTuple, get_type_hints
+from dataclasses import MISSING, field, fields
+from typing import Annotated, Any, Final, NamedTuple, get_type_hints
+
+from driftwalk.cli.options.shared_types import option
 
 Command = Callable[..., Any]
+OPTION: Final = "option"
+"""Key of a field's metadata under which its option is declared."""
 
 
 class Part(NamedTuple):
@@ -69,20 +73,26 @@ def spread(
     return command
 
 
+def option_field(names: str, help: str, *, default: Any = None, **more: Any) -> Any:
+    """Return a field of a dataclass that is an option; see `option`."""
+    return field(default=default, metadata={OPTION: option(names, help, **more)})
+
+
 def with_options(kind: Any, *names: str) -> Callable[[Command], Command]:
     """Spread a command's parameter of a dataclass into an option per field, or per named field.
 
-    A field is annotated with its option, whose default is that of the field.
+    A field is declared by `option_field`, or annotated with its option; the default is the field's.
     """
     hints = get_type_hints(kind, include_extras=True)
     required = inspect.Parameter.empty
-    defaults = {
-        one.name: required if one.default is MISSING else one.default for one in fields(kind)
-    }
-    parts = {
-        name: Part(hints[name], default)
-        for name, default in defaults.items()
-        if not names or name in names
-    }
-    absent = {name: None for name in defaults.keys() - parts.keys() if defaults[name] is required}
+    parts, absent = dict[str, Part](), dict[str, None]()
+    for one in fields(kind):
+        default = required if one.default is MISSING else one.default
+        hint = hints[one.name]
+        if names and one.name not in names:
+            absent |= {one.name: None} if default is required else {}
+        elif OPTION in one.metadata:
+            parts[one.name] = Part(Annotated[hint, one.metadata[OPTION]], default)
+        else:
+            parts[one.name] = Part(hint, default)
     return lambda function: spread(function, kind, parts, lambda given: kind(**absent, **given))

@@ -12,10 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
-from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared_types import READING, argument, option, scale_option
+from driftwalk.cli.options.flatten_options import OPTION, option_field, with_options
+from driftwalk.cli.options.shared_types import READING, SCALE, argument, parse_scale
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _ARGUMENTS = {"fps": "frame_rate", "scale": "metres_per_pixel"}
 """Fields that have another name in `driftwalk.load`."""
-_option = partial(option, panel=READING)
+_option = partial(option_field, panel=READING)
 RecordingFile = Annotated[Path, argument("RECORDING", "Recording, in any readable format.")]
 
 
@@ -31,142 +31,77 @@ RecordingFile = Annotated[Path, argument("RECORDING", "Recording, in any readabl
 class RecordingOptions:
     """How to read a recording; the fields are the options."""
 
-    format: Annotated[
-        str | None,
-        _option("--format", "Format of the file (default: recognised by content)."),
-    ] = None
-    body: Annotated[str | None, _option("--body NAME|all", "Body to keep, or all.")] = None
-    start: Annotated[float | None, _option("--from", "First time to keep.", unit="s")] = None
-    stop: Annotated[float | None, _option("--to", "Last time to keep.", unit="s")] = None
-    tank: Annotated[
-        str | None,
-        _option(
-            "--tank D|WxH|polygon:FILE|fit",
-            "Tank: the diameter (40cm), two sides (60cmx40cm), or fit; @X,Y after a size "
-            "gives its centre in metres.",
-        ),
-    ] = None
-    fps: Annotated[
-        float | None,
-        _option("--fps", "Frames per second, if the file counts frames.", unit="Hz"),
-    ] = None
-    scale: Annotated[float | None, scale_option(READING)] = None
-    length_unit: Annotated[
-        str | None,
-        _option(
-            "--length-unit m|cm|mm|um|ft|in|px",
-            "Unit of positions, if the file names none.",
-        ),
-    ] = None
-    y_axis: Annotated[
-        str | None,
-        _option("--y-axis up|down", "Direction of y and of angles in the file."),
-    ] = None
-    max_speed: Annotated[
-        float | None,
-        _option(
-            "--max-speed",
-            "Fastest plausible speed; samples that need a faster one become gaps.",
-            unit="m/s",
-        ),
-    ] = None
-    sort: Annotated[
-        bool, _option("--sort", "Sort times that go backwards (default: refuse them).")
-    ] = False
-    columns: Annotated[
-        list[str] | None,
-        _option(
-            "--columns t=NAME,x=NAME,y=NAME",
-            "Columns of a plain table by name or number from 1, with an optional :unit. "
-            "Repeatable.",
-        ),
-    ] = None
-    delimiter: Annotated[
-        str | None,
-        _option(
-            "--delimiter CHARACTER",
-            "Character between fields, or tab or space (default: recognised).",
-        ),
-    ] = None
-    up: Annotated[
-        str | None,
-        _option(
-            "--up x|y|z|-x|-y|-z",
-            "Axis that points up, if the file has three axes (default: the format's).",
-        ),
-    ] = None
-    topic: Annotated[
-        str | None,
-        _option(
-            "--topic NAME[,NAME]",
-            "Topic of a ROS bag, or several, separated by commas.",
-        ),
-    ] = None
-    header_line: Annotated[
-        int | None,
-        _option(
-            "--header-line N",
-            "Line of a plain table, from 1, that names its columns.",
-            min=1,
-        ),
-    ] = None
-    sheet: Annotated[
-        str | None,
-        _option(
-            "--sheet NAME",
-            "Sheet of a workbook, by name or number from 1, or variable of a MATLAB file.",
-        ),
-    ] = None
-    x: Annotated[
-        Path | None,
-        _option("--x FILE", "Matrix of x: a row per frame, a column per body."),
-    ] = None
-    y: Annotated[Path | None, _option("--y FILE", "Matrix of y.")] = None
-    theta: Annotated[Path | None, _option("--theta FILE", "Matrix of angles.")] = None
-    keypoint: Annotated[
-        str | None,
-        _option("--keypoint NAME", "Keypoint of a pose file to use as the body."),
-    ] = None
-    heading: Annotated[
-        str | None,
-        _option(
-            "--heading FROM,TO",
-            "Two keypoints, or two bodies that are markers of one; the orientation is the "
-            "angle from the first to the second.",
-        ),
-    ] = None
-    min_confidence: Annotated[
-        float | None,
-        _option(
-            "--min-confidence SHARE",
-            "Smallest confidence of a keypoint or row; others are missing (default: the format's).",
-            min=0.0,
-        ),
-    ] = None
-    box: Annotated[
-        str | None,
-        _option(
-            "--box xyxy|xywh|cxcywh[@WxH]|none",
-            "Columns of a box: two corners, corner or centre with its size, or no box; "
-            "of shares of an image also its size (cxcywh@1920x1080).",
-        ),
-    ] = None
-    missing: Annotated[
-        list[str] | None,
-        _option(
-            "--missing X,Y|NUMBER|held",
-            "Position that means that the body was not seen, or held: that of the sample "
-            "before. Repeatable.",
-        ),
-    ] = None
-    replicate: Annotated[
-        int | None,
-        _option(
-            "--replicate N",
-            "Replicate of a simulation, counted from 0 (default: the first).",
-            min=0,
-        ),
-    ] = None
+    format: str | None = _option("--format", "Format of the file (default: recognised by content).")
+    body: str | None = _option("--body NAME|all", "Body to keep, or all.")
+    start: float | None = _option("--from", "First time to keep.", unit="s")
+    stop: float | None = _option("--to", "Last time to keep.", unit="s")
+    tank: str | None = _option(
+        "--tank D|WxH|polygon:FILE|fit",
+        "Tank: the diameter (40cm), two sides (60cmx40cm), or fit; @X,Y after a size "
+        "gives its centre in metres.",
+    )
+    fps: float | None = _option("--fps", "Frames per second, if the file counts frames.", unit="Hz")
+    scale: float | None = _option("--scale <m>", SCALE, parser=parse_scale)
+    length_unit: str | None = _option(
+        "--length-unit m|cm|mm|um|ft|in|px", "Unit of positions, if the file names none."
+    )
+    y_axis: str | None = _option("--y-axis up|down", "Direction of y and of angles in the file.")
+    max_speed: float | None = _option(
+        "--max-speed",
+        "Fastest plausible speed; samples that need a faster one become gaps.",
+        unit="m/s",
+    )
+    sort: bool = _option(
+        "--sort", "Sort times that go backwards (default: refuse them).", default=False
+    )
+    columns: list[str] | None = _option(
+        "--columns t=NAME,x=NAME,y=NAME",
+        "Columns of a plain table by name or number from 1, with an optional :unit. Repeatable.",
+    )
+    delimiter: str | None = _option(
+        "--delimiter CHARACTER", "Character between fields, or tab or space (default: recognised)."
+    )
+    up: str | None = _option(
+        "--up x|y|z|-x|-y|-z",
+        "Axis that points up, if the file has three axes (default: the format's).",
+    )
+    topic: str | None = _option(
+        "--topic NAME[,NAME]", "Topic of a ROS bag, or several, separated by commas."
+    )
+    header_line: int | None = _option(
+        "--header-line N", "Line of a plain table, from 1, that names its columns.", min=1
+    )
+    sheet: str | None = _option(
+        "--sheet NAME",
+        "Sheet of a workbook, by name or number from 1, or variable of a MATLAB file.",
+    )
+    x: Path | None = _option("--x FILE", "Matrix of x: a row per frame, a column per body.")
+    y: Path | None = _option("--y FILE", "Matrix of y.")
+    theta: Path | None = _option("--theta FILE", "Matrix of angles.")
+    keypoint: str | None = _option("--keypoint NAME", "Keypoint of a pose file to use as the body.")
+    heading: str | None = _option(
+        "--heading FROM,TO",
+        "Two keypoints, or two bodies that are markers of one; the orientation is the "
+        "angle from the first to the second.",
+    )
+    min_confidence: float | None = _option(
+        "--min-confidence SHARE",
+        "Smallest confidence of a keypoint or row; others are missing (default: the format's).",
+        min=0.0,
+    )
+    box: str | None = _option(
+        "--box xyxy|xywh|cxcywh[@WxH]|none",
+        "Columns of a box: two corners, corner or centre with its size, or no box; "
+        "of shares of an image also its size (cxcywh@1920x1080).",
+    )
+    missing: list[str] | None = _option(
+        "--missing X,Y|NUMBER|held",
+        "Position that means that the body was not seen, or held: that of the sample "
+        "before. Repeatable.",
+    )
+    replicate: int | None = _option(
+        "--replicate N", "Replicate of a simulation, counted from 0 (default: the first).", min=0
+    )
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments of `driftwalk.load` that are given."""
@@ -185,10 +120,9 @@ class RecordingOptions:
 
     def words(self) -> list[str]:
         """Return the options that are given, as a user types them."""
-        hints = get_type_hints(RecordingOptions, include_extras=True)
         words: list[str] = []
         for field in fields(self):
-            value, option = getattr(self, field.name), hints[field.name].__metadata__[0]
+            value, option = getattr(self, field.name), field.metadata[OPTION]
             # In an annotation, the name of an option is where a default would be elsewhere.
             name = str(option.default)
             for one in value if isinstance(value, list) else [value]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from driftwalk.cli.options.flatten_options import with_options
+from driftwalk.cli.options.flatten_options import option_field, with_options
 from driftwalk.cli.options.shared_types import Json, Overwrite, Threads, option
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.cli.terminal.progress import reported
@@ -21,22 +21,16 @@ class RunOptions:
 
     out: Annotated[Path, option("--out -o DIR", "Run directory to make or continue.")]
     threads: Threads = None
-    cluster: Annotated[
-        str | None,
-        option(
-            "--cluster local:N|tcp://HOST:PORT|slurm:N",
-            "Workers: N processes on this machine, a Dask scheduler, or N jobs of slurm (pbs, "
-            "sge, lsf, oar, moab, htcondor). Needs driftwalk[cluster].",
-        ),
-    ] = None
-    cluster_options: Annotated[
-        list[str] | None,
-        option(
-            "--cluster-option NAME=VALUE",
-            "Option passed to dask-jobqueue, such as queue=short or walltime=02:00:00; repeat "
-            "for others.",
-        ),
-    ] = None
+    cluster: str | None = option_field(
+        "--cluster local:N|tcp://HOST:PORT|slurm:N",
+        "Workers: N processes on this machine, a Dask scheduler, or N jobs of slurm (pbs, "
+        "sge, lsf, oar, moab, htcondor). Needs driftwalk[cluster].",
+    )
+    cluster_options: list[str] | None = option_field(
+        "--cluster-option NAME=VALUE",
+        "Option passed to dask-jobqueue, such as queue=short or walltime=02:00:00; repeat "
+        "for others.",
+    )
     overwrite: Overwrite = False
     json: Json = False
 

@@ -14,6 +14,8 @@ from driftwalk.core.units import Uncertain, parse_quantity, split_uncertain
 PANEL: Final = "Parameters"
 READING: Final = "How to read the recording"
 """The panels of the help that several commands have."""
+SCALE: Final = "Size of a pixel, such as 0.5mm or 2000px/m."
+"""What the option for the scale of an image says."""
 
 
 def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
@@ -83,12 +85,6 @@ def parse_scale(text: Any) -> Any:
             raise typer.BadParameter(f"a scale is above zero, got {text}")
         return 1.0 / pixels
     return quantity_parser("m")(text)
-
-
-def scale_option(panel: str) -> Any:
-    """Return the declaration of the option for the scale of an image."""
-    said = "Size of a pixel, such as 0.5mm or 2000px/m."
-    return option("--scale <m>", said, panel=panel, parser=parse_scale)
 
 
 def flow_of_run(path: Path | None) -> Path | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.inputs.recordings import open_kind
-from driftwalk.cli.options.flatten_options import with_options
+from driftwalk.cli.options.flatten_options import option_field, with_options
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared_types import Json, Replace, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -35,57 +35,36 @@ _PANEL = "Criteria of a join"
 _TOO_CLOSE = 0.8
 
 
-_tolerance = partial(option, panel=_PANEL)
+_tolerance = partial(option_field, panel=_PANEL)
 
 
 @dataclass(frozen=True)
 class JoinCriteria:
     """When faces join and part; the fields are the options."""
 
-    join_distance: Annotated[
-        float | None,
-        _tolerance(
-            "--join-distance", "Distance of face centres that join (default: side / 10).", unit="m"
-        ),
-    ] = None
-    join_angle: Annotated[
-        float | None,
-        _tolerance("--join-angle", "Angle between faces that join (default: 10deg).", unit="rad"),
-    ] = None
-    release_distance: Annotated[
-        float | None,
-        _tolerance(
-            "--release-distance",
-            "Distance that parts them (default: twice that to join).",
-            unit="m",
-        ),
-    ] = None
-    release_angle: Annotated[
-        float | None,
-        _tolerance(
-            "--release-angle", "Angle that parts them (default: twice that to join).", unit="rad"
-        ),
-    ] = None
-    min_duration: Annotated[
-        float | None,
-        _tolerance(
-            "--min-duration", "Shortest join or parting that counts (default: 0.5s).", unit="s"
-        ),
-    ] = None
-    hold: Annotated[
-        float | None,
-        _tolerance(
-            "--hold", "Time for which an unseen block keeps its joins (default: 1s).", unit="s"
-        ),
-    ] = None
-    play: Annotated[
-        float | None,
-        _tolerance(
-            "--play",
-            "How far joined faces may move against each other (default: as far as noise does).",
-            unit="m",
-        ),
-    ] = None
+    join_distance: float | None = _tolerance(
+        "--join-distance", "Distance of face centres that join (default: side / 10).", unit="m"
+    )
+    join_angle: float | None = _tolerance(
+        "--join-angle", "Angle between faces that join (default: 10deg).", unit="rad"
+    )
+    release_distance: float | None = _tolerance(
+        "--release-distance", "Distance that parts them (default: twice that to join).", unit="m"
+    )
+    release_angle: float | None = _tolerance(
+        "--release-angle", "Angle that parts them (default: twice that to join).", unit="rad"
+    )
+    min_duration: float | None = _tolerance(
+        "--min-duration", "Shortest join or parting that counts (default: 0.5s).", unit="s"
+    )
+    hold: float | None = _tolerance(
+        "--hold", "Time for which an unseen block keeps its joins (default: 1s).", unit="s"
+    )
+    play: float | None = _tolerance(
+        "--play",
+        "How far joined faces may move against each other (default: as far as noise does).",
+        unit="m",
+    )
 
 
 @with_options(JoinCriteria)
