@@ -15,17 +15,9 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.text.json_text import json_value
+from driftwalk.page import parts
 from driftwalk.page.html import page_frame
-from driftwalk.page.parts import (
-    FOUND_TITLE,
-    SIMULATED,
-    Section,
-    attempt,
-    is_simulated,
-    section,
-    summary_section,
-    warnings_section,
-)
+from driftwalk.page.parts import Section, is_simulated
 from driftwalk.page.sections.recording import (
     noise_of,
     recording_sections,
@@ -91,7 +83,7 @@ def report_page(folder: str | Path, *, tell: Callable[[str], None] = tell_nobody
         raise InputError(f"{run.folder} holds a finished run, but {reason}")
     words = _words_of_state(run)
     if words is not None:
-        state = summary_section([words], [], id="state", title="Not finished")
+        state = parts.summary_section([words], [], id="state", title="Not finished")
         sections = [state, *sections]
     remarks = _remarks(run)
     for remark in remarks:
@@ -177,10 +169,10 @@ def recording_page(
     facts = {} if described is None else described
     names = body_names(trajectory)
     tracking = facts.get("tracking")
-    remarks = [SIMULATED] if is_simulated(trajectory) else []
+    remarks = [parts.SIMULATED] if is_simulated(trajectory) else []
     remarks += [*tracking_warnings(tracking), *(str(text) for text in facts.get("warnings", []))]
     sections = [
-        warnings_section(remarks),
+        parts.warnings_section(remarks),
         *tracking_sections(tracking),
         *recording_sections(trajectory, noise={name: noise_of(facts, name) for name in names}),
     ]
@@ -302,7 +294,7 @@ def manifest_section(manifest: Mapping[str, Any]) -> Section:
     software = manifest.get("software")
     known = software.get("driftwalk") if isinstance(software, Mapping) else None
     version = str(known or __version__)
-    return section(
+    return parts.section(
         "manifest", "manifest", "How to reproduce this",
         "The command reproduces the same numbers from the same inputs.",
         command=str(manifest.get("command", "")),
@@ -346,7 +338,7 @@ def _words_of_state(run: StoredRun) -> str | None:
 
 def _sections_of(run: RunContents, kind: RunKind) -> list[Section]:
     # What data in another form break outside of any section costs the page, and not the program.
-    return attempt("summary", FOUND_TITLE, lambda: run.make(kind, kind.page))
+    return parts.attempt("summary", parts.FOUND_TITLE, lambda: run.make(kind, kind.page))
 
 
 def _remarks(run: StoredRun) -> list[str]:
@@ -374,7 +366,7 @@ def _with_remarks(sections: list[Section], remarks: list[str]) -> list[Section]:
             part["items"] = [*remarks, *part["items"]]
             part["note"] = None
             return sections
-    return [warnings_section(remarks), *sections]
+    return [parts.warnings_section(remarks), *sections]
 
 
 _OPEN: Final = frozenset({"summary", "state", "warnings"})

@@ -10,23 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.units import percent
-from driftwalk.page.parts import (
-    Section,
-    attempt,
-    chart,
-    count,
-    figure_with_ends,
-    label,
-    mark,
-    quantity,
-    require,
-    required,
-    section_of_table,
-    sections_of,
-    series,
-    summary_section,
-    value_of,
-)
+from driftwalk.page import parts
+from driftwalk.page.parts import Section, count, quantity, require, required, value_of
 from driftwalk.page.sections.outcomes import (
     class_times_section,
     classes_section,
@@ -94,32 +79,34 @@ def assembly_sections(
     ['empty']
     """
     outcomes = _by_set(distribution, distribution_drawn)
-    made = sections_of(
+    made = parts.sections_of(
         distribution,
         "There are no outcomes yet.",
         lambda found: assembly_summary(found, distribution_drawn, class_times, assembly, sizes),
         lambda _: _left_out(outcomes),
     )
     if outcomes and sizes is None:
-        made += attempt("classes", "Structures built", lambda: classes_section(outcomes))
+        made += parts.attempt("classes", "Structures built", lambda: classes_section(outcomes))
     if sizes is not None:
         made += size_sections(_by_set(sizes, sizes_drawn))
     if class_times is not None:
         if sizes is None:
             title = "Outcome classes over time"
-            made += attempt("class-times", title, lambda: class_times_section(class_times))
+            made += parts.attempt("class-times", title, lambda: class_times_section(class_times))
         title = "Time to contact and completion"
-        made += attempt("survival", title, lambda: survival_section(class_times))
+        made += parts.attempt("survival", title, lambda: survival_section(class_times))
     if steady_state is not None:
         title = "Steady state"
-        made += attempt("steady-state", title, lambda: steady_sections(steady_state))
+        made += parts.attempt("steady-state", title, lambda: steady_sections(steady_state))
     if attraction is not None:
         title = "Force between two blocks"
-        made += attempt("attraction", title, lambda: attraction_section(attraction))
+        made += parts.attempt("attraction", title, lambda: attraction_section(attraction))
     if path is not None:
-        made += attempt("replay", "Sample runs", lambda: replay_section(path, assembly))
+        made += parts.attempt("replay", "Sample runs", lambda: replay_section(path, assembly))
     if assembly_drawn is not None:
-        made += attempt("drawn", "The drawn parameters", lambda: drawn_section(assembly_drawn))
+        made += parts.attempt(
+            "drawn", "The drawn parameters", lambda: drawn_section(assembly_drawn)
+        )
     return made
 
 
@@ -159,16 +146,16 @@ def assembly_summary(
     ]
     done += f" ({', '.join(rules)})" if rules else ""
     paragraphs = [f"{done}.", _most_common(distribution, named=sizes is None)]
-    shown = [figure_with_ends(distribution, "complete", "complete: one assembly")]
+    shown = [parts.figure_with_ends(distribution, "complete", "complete: one assembly")]
     if drawn is not None:
         paragraphs.append(_beside(distribution, drawn, classes=sizes is None))
-        shown.append(figure_with_ends(drawn, "complete", "complete, parameters drawn"))
+        shown.append(parts.figure_with_ends(drawn, "complete", "complete, parameters drawn"))
     if sizes is not None:
         shown += size_numbers(sizes)
     paragraphs.append("These predictions use latching rules that no recording has settled.")
     if times is not None:
         shown += [_median(times, name) for name in SURVIVAL]
-    return summary_section(paragraphs, shown)
+    return parts.summary_section(paragraphs, shown)
 
 
 def survival_section(times: xr.Dataset) -> Section:
@@ -179,11 +166,11 @@ def survival_section(times: xr.Dataset) -> Section:
         ends = [f"{name}_{end}" for end in ("low", "high")]
         known = all(end in times for end in ends)
         band = (times[ends[0]].values, times[ends[1]].values) if known else None
-        drawn.append(series(words, times["time"].values, times[name].values, ends=band))
-    return chart(
+        drawn.append(parts.series(words, times["time"].values, times[name].values, ends=band))
+    return parts.chart(
         "survival", "Time to contact and completion",
-        x=label("time", "s"), y=label("share of runs"), series=drawn,
-        marks=[mark("half of the runs", y=0.5)],
+        x=parts.label("time", "s"), y=parts.label("share of runs"), series=drawn,
+        marks=[parts.mark("half of the runs", y=0.5)],
     )  # fmt: skip
 
 
@@ -192,15 +179,16 @@ def attraction_section(attraction: xr.Dataset) -> Section:
     require(attraction, "gap", "force", "simulated_force")
     gap = attraction["gap"].values
     drawn = [
-        series(words, gap[found > 0.0], found[found > 0.0])
+        parts.series(words, gap[found > 0.0], found[found > 0.0])
         for words, found in (
             ("as stated", attraction["force"].values),
             ("in the simulation", attraction["simulated_force"].values),
         )
     ]
-    return chart(
+    return parts.chart(
         "attraction", "Force between two blocks", f"{attraction_words(attraction)}.",
-        x=label("gap between the faces", "m"), y=label("attraction", "N", log=True), series=drawn,
+        x=parts.label("gap between the faces", "m"), y=parts.label("attraction", "N", log=True),
+        series=drawn,
     )  # fmt: skip
 
 
@@ -214,10 +202,10 @@ def drawn_section(assembly: xr.Dataset) -> Section:
     note = f"{count(int(force.size), 'run')}, each with its own parameters."
     if "flow" in what:
         note += " Each also has its own flow, drawn within the errors of the field."
-    return chart(
+    return parts.chart(
         "drawn", "The drawn parameters", note,
-        x=label(f"stochastic force σ_F{redrawn}", "N"), y=label("drag coefficient C_d"),
-        series=[series("runs", force, drag, style="points")],
+        x=parts.label(f"stochastic force σ_F{redrawn}", "N"), y=parts.label("drag coefficient C_d"),
+        series=[parts.series("runs", force, drag, style="points")],
     )  # fmt: skip
 
 
@@ -289,7 +277,7 @@ def _most_common(distribution: xr.Dataset, *, named: bool) -> str:
 def _median(times: xr.Dataset, name: str) -> dict[str, Any]:
     known = value_of(times, f"{name}_median_s") is not None
     note = None if known else "not reached in half the runs"
-    return figure_with_ends(
+    return parts.figure_with_ends(
         times, f"{name}_median", f"{axis_number(name).plain}, median", "s", suffix="_s", note=note
     )
 
@@ -332,13 +320,16 @@ def steady_sections(steady: xr.Dataset) -> list[Section]:
             one = steady.isel({"class": place})
             ends = (one["survival_low"].values, one["survival_high"].values)
             name = short_class(str(one["class"].values))
-            drawn.append(series(name, steady["age"].values, one["survival"].values, ends=ends))
+            drawn.append(
+                parts.series(name, steady["age"].values, one["survival"].values, ends=ends)
+            )
     return [
-        section_of_table("steady-state", "Steady state", table, note),
-        chart(
+        parts.section_of_table("steady-state", "Steady state", table, note),
+        parts.chart(
             "lifetimes", "Lifetimes of the classes",
             "Kaplan-Meier, censored at the end of a run; a stay ends with a joining or a parting.",
-            x=label("time since the class formed", "s"), y=label("share that lasts longer"),
-            series=drawn, marks=[mark("half of the stays", y=0.5)],
+            x=parts.label("time since the class formed", "s"),
+            y=parts.label("share that lasts longer"), series=drawn,
+            marks=[parts.mark("half of the stays", y=0.5)],
         ),
     ]  # fmt: skip

@@ -7,29 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from driftwalk.page import parts
 from driftwalk.page.arrays import number
 from driftwalk.page.parts import (
-    SIMULATED,
     Maker,
     Section,
-    attempt,
-    card,
-    chart,
     count,
-    empty_section,
-    figure,
     is_simulated,
-    label,
-    mark,
     quantity,
     require,
     required,
-    sections_of,
-    series,
-    summary_section,
-    table_section,
     value_of,
-    verdict_paragraphs,
     with_interval,
 )
 from driftwalk.page.sections.flow import flow_sections
@@ -84,7 +72,7 @@ def calibration_sections(
     """
     nothing = "There is no calibration yet."
     said = partial(sentences, name="warning")
-    made = sections_of(calibration, nothing, calibration_summary, said)
+    made = parts.sections_of(calibration, nothing, calibration_summary, said)
     if recording is not None:
         noise = None if calibration is None else _noise(calibration)
         made += recording_sections(recording, body=body, noise=noise)
@@ -92,42 +80,44 @@ def calibration_sections(
         made += flow_sections(flow)
     if calibration is None:
         return made
-    parts: list[tuple[str, str, Maker]] = [
+    pieces: list[tuple[str, str, Maker]] = [
         ("profiles", "Along the optimum", profile_sections),
         ("bootstrap", "The bootstrap", bootstrap_section),
         ("validation", "Validation", validation_section),
     ]
     if len(page_parameters(calibration)) != 1:
         one = one_body(recording, body)
-        parts.insert(0, ("map", "The map", lambda found: map_section(found, one)))
-    for id, title, make in parts:
-        made += attempt(id, title, partial(make, calibration))
+        pieces.insert(0, ("map", "The map", lambda found: map_section(found, one)))
+    for id, title, make in pieces:
+        made += parts.attempt(id, title, partial(make, calibration))
     return made
 
 
 def calibration_summary(calibration: xr.Dataset) -> Section:
     """Return the answer of a calibration in words and numbers."""
     require(calibration, "ks_distance")
-    paragraphs = [SIMULATED] if is_simulated(calibration) else []
+    paragraphs = [parts.SIMULATED] if is_simulated(calibration) else []
     paragraphs += [_what_was_done(calibration), _what_was_found(calibration)]
     shown = [
         *_estimates(calibration),
-        figure("KS distance at the optimum", value_of(calibration, "ks_distance"), symbol="D"),
-        figure(
+        parts.figure(
+            "KS distance at the optimum", value_of(calibration, "ks_distance"), symbol="D"
+        ),
+        parts.figure(
             "noise floor", value_of(calibration, "noise_floor"),
             note="distance between two runs of the same model",
         ),
     ]  # fmt: skip
-    return summary_section([*paragraphs, *_how_good(calibration)], shown)
+    return parts.summary_section([*paragraphs, *_how_good(calibration)], shown)
 
 
 def _estimates(calibration: xr.Dataset) -> list[dict[str, Any]]:
     """Return the estimates; of the block the noise intensity as well."""
     require(calibration, "estimate", "parameter", "unit")
-    shown = [card(one) for one in estimates(calibration)]
+    shown = [parts.card(one) for one in estimates(calibration)]
     intensity = value_of(calibration, "force_noise_intensity_N2_s")
     if is_block(calibration):
-        shown.append(figure("noise intensity", intensity, "N² s", symbol="σ_F²·τ"))
+        shown.append(parts.figure("noise intensity", intensity, "N² s", symbol="σ_F²·τ"))
     return shown
 
 
@@ -171,35 +161,35 @@ def bootstrap_section(calibration: xr.Dataset) -> Section:
     title = "How well the parameters are known"
     if any(f"bootstrap_{one.name}" not in calibration for one in parameters):
         reason = "The calibration was made without a bootstrap: no interval, no region."
-        return empty_section("bootstrap", title, reason)
+        return parts.empty_section("bootstrap", title, reason)
     estimates = [calibration[f"bootstrap_{one.name}"].values for one in parameters]
     note = (
         f"{count(int(estimates[0].size), 'recording')} simulated at the optimum, each calibrated "
         "like the real one."
     )
     name = "estimates from simulated recordings"
-    marks = [mark("estimate", *(value_of(calibration, one.key) for one in parameters))]
+    marks = [parts.mark("estimate", *(value_of(calibration, one.key) for one in parameters))]
     if len(parameters) == 1:
         values = np.sort(estimates[0])
-        y = label("share of the estimates up to here")
-        drawn = [series(name, values, np.arange(1, values.size + 1) / values.size)]
+        y = parts.label("share of the estimates up to here")
+        drawn = [parts.series(name, values, np.arange(1, values.size + 1) / values.size)]
         ends = interval_of(calibration, f"{parameters[0].key}_interval") or ()
-        marks += [mark("end of the interval", end) for end in ends]
+        marks += [parts.mark("end of the interval", end) for end in ends]
     else:
         y = parameters[1].axis(calibration)
-        drawn = [series(name, estimates[0], estimates[1], style="points")]
+        drawn = [parts.series(name, estimates[0], estimates[1], style="points")]
         region = region_part(calibration)
         if region is not None:
-            drawn.append(series("joint region", *([*region[n], region[n][0]] for n in "xy")))
+            drawn.append(parts.series("joint region", *([*region[n], region[n][0]] for n in "xy")))
     x = parameters[0].axis(calibration)
-    return chart("bootstrap", title, note, x=x, y=y, series=drawn, marks=marks)
+    return parts.chart("bootstrap", title, note, x=x, y=y, series=drawn, marks=marks)
 
 
 def validation_section(calibration: xr.Dataset) -> Section:
     """Return the calibration on the first half, judged on the second."""
     title = "Fitted on the first half, tested on the second"
     if "second_half_ks_distance" not in calibration:
-        return empty_section("validation", title, "The recording was not split into halves.")
+        return parts.empty_section("validation", title, "The recording was not split into halves.")
     keys = [
         (f"{_with_unit(one)}, {part}", f"{prefix}{one.key}", 1e3 if one == FORCE else 1.0)
         for one in page_parameters(calibration)
@@ -215,7 +205,7 @@ def validation_section(calibration: xr.Dataset) -> Section:
         [label, None if (value := value_of(calibration, key)) is None else scale * value]
         for label, key, scale in keys
     ]
-    return table_section("validation", title, ["", "value"], rows)
+    return parts.table_section("validation", title, ["", "value"], rows)
 
 
 def _with_unit(one: PageParameter) -> str:
@@ -280,7 +270,7 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
     distance, floor = (value_of(calibration, name) for name in ("ks_distance", "noise_floor"))
     if distance is None or floor is None:
         return []
-    verdict = verdict_paragraphs(
+    verdict = parts.verdict_paragraphs(
         stored_verdict(calibration),
         UNCHECKED,
         more="A small distance does not prove that the model is right.",
@@ -312,22 +302,26 @@ def _profile(calibration: xr.Dataset, along: PageParameter) -> Section:
         for other in others
     ]
     marks = [
-        mark("optimum", value_of(calibration, along.key), value_of(calibration, "ks_distance"))
+        parts.mark(
+            "optimum", value_of(calibration, along.key), value_of(calibration, "ks_distance")
+        )
     ]
     floor = value_of(calibration, "noise_floor")
     if floor is not None:
-        marks.append(mark("noise floor", y=floor))
+        marks.append(parts.mark("noise floor", y=floor))
     where = "At " + ", ".join(fixed) + ", the setting of the map next to the optimum."
     drawn = _profile_series(line, along.name)
     if not others and "refined_surface" in calibration:
         fine = calibration["refined_surface"]
-        drawn.append(series("fitted curve", calibration[f"refined_{along.name}"].values, fine))
-    return chart(
+        drawn.append(
+            parts.series("fitted curve", calibration[f"refined_{along.name}"].values, fine)
+        )
+    return parts.chart(
         f"profile-{along.name.replace('_', '-')}",
         f"Distance along the {along.label}",
         where if fixed else "Every setting that was simulated.",
         x=along.axis(calibration),
-        y=label("KS distance D", log=True),
+        y=parts.label("KS distance D", log=True),
         series=drawn,
         marks=marks,
     )
@@ -340,12 +334,12 @@ def _profile_series(line: xr.Dataset, along: str) -> list[dict[str, Any]]:
     if "ks_distance_replicate" in line:
         replicates = line["ks_distance_replicate"].transpose(along, ...).values
         each = np.repeat(values, replicates.shape[1])
-        drawn.append(series("replicates", each, replicates.ravel(), style="points"))
+        drawn.append(parts.series("replicates", each, replicates.ravel(), style="points"))
     ends = None
     if "ks_distance_standard_error" in line:
         error = line["ks_distance_standard_error"].values
         ends = (distance - error, distance + error)
-    return [*drawn, series("mean ± standard error", values, distance, ends=ends)]
+    return [*drawn, parts.series("mean ± standard error", values, distance, ends=ends)]
 
 
 def _noise(calibration: xr.Dataset) -> Noise | None:

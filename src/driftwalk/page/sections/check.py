@@ -10,23 +10,9 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.units import percent
+from driftwalk.page import parts
 from driftwalk.page.arrays import encode_array, number
-from driftwalk.page.parts import (
-    Maker,
-    Section,
-    arena_part,
-    attempt,
-    axis,
-    chart,
-    empty_section,
-    label,
-    mark,
-    require,
-    section,
-    series,
-    table_section,
-    value_of,
-)
+from driftwalk.page.parts import Maker, Section, require, value_of
 from driftwalk.plot.model_check import BAND_STDS, LEAST_TOP, running_time
 from driftwalk.schema.answers.fit import marked_criteria
 
@@ -74,8 +60,8 @@ def check_sections(check: xr.Dataset) -> list[Section]:
     )
     made: list[Section] = []
     for id, title, make in makers:
-        parts = attempt(id, title, partial(make, check))
-        made += [{**part, "id": id, "title": title} for part in parts]
+        pieces = parts.attempt(id, title, partial(make, check))
+        made += [{**part, "id": id, "title": title} for part in pieces]
     return made
 
 
@@ -96,7 +82,7 @@ def _criteria(check: xr.Dataset) -> Section:
     if any(row[0].endswith(": small") for row in rows):
         note += " Where it says 'small', the misfit is too small to change the verdict."
     heads = ["test", "what it looks for", "p value", "found nine times in ten"]
-    return table_section("", "", heads, rows, note)
+    return parts.table_section("", "", heads, rows, note)
 
 
 def _innovations(check: xr.Dataset) -> Section:
@@ -105,15 +91,15 @@ def _innovations(check: xr.Dataset) -> Section:
     expected = check["autocorrelation_expected"].values.mean(axis=0)
     reach = BAND_STDS * check["autocorrelation_std"].values.mean(axis=0)
     band = (expected - reach, expected + reach)
-    drawn = [series("95 % if the model is right", lag, expected, ends=band)]
+    drawn = [parts.series("95 % if the model is right", lag, expected, ends=band)]
     for name, values in zip(
         check["component"].values, check["autocorrelation"].values, strict=True
     ):
         shown = "θ" if name == "theta" else name
-        drawn.append(series(f"error in {shown}", lag, values, style="points"))
-    return chart(
+        drawn.append(parts.series(f"error in {shown}", lag, values, style="points"))
+    return parts.chart(
         "", "", "Errors of a right model have no memory.",
-        x=label("lag (samples)"), y=label("autocorrelation"), series=drawn,
+        x=parts.label("lag (samples)"), y=parts.label("autocorrelation"), series=drawn,
     )  # fmt: skip
 
 
@@ -154,11 +140,11 @@ def _field(
     diverging: bool,
     limits: list[float],
 ) -> Section:
-    return section(
+    return parts.section(
         "", "image_grid", "", note,
-        arena=arena_part(check),
-        x=axis("x", "x", "m", check["x"].values),
-        y=axis("y", "y", "m", check["y"].values),
+        arena=parts.arena_part(check),
+        x=parts.axis("x", "x", "m", check["x"].values),
+        y=parts.axis("y", "y", "m", check["y"].values),
         value=encode_array(values), label=words, unit="1", diverging=diverging, limits=limits,
     )  # fmt: skip
 
@@ -182,16 +168,16 @@ def _over_time(
     note = "Tenths of the recording, with 95 % bars; 0 if nothing changes."
     if absorbed and np.isnan(value).any():
         note += f" {absorbed}"
-    return chart(
+    return parts.chart(
         "", "", note,
-        x=label("time", "s"), y=label(words),
+        x=parts.label("time", "s"), y=parts.label(words),
         series=[_with_bars("tenths", 0.5 * (start + end), value, reach)],
-        marks=[mark("no change", y=0.0)],
+        marks=[parts.mark("no change", y=0.0)],
     )  # fmt: skip
 
 
 def _with_bars(name: str, x: Floats, value: Floats, reach: Floats) -> dict[str, Any]:
-    return series(name, x, value, ends=(value - reach, value + reach), style="points")
+    return parts.series(name, x, value, ends=(value - reach, value + reach), style="points")
 
 
 def _drag_by_speed(check: xr.Dataset) -> Section:
@@ -199,36 +185,37 @@ def _drag_by_speed(check: xr.Dataset) -> Section:
     value = check["drag_change"].values
     reach = BAND_STDS * check["drag_change_std"].values
     middle = 0.5 * (check["speed_low"].values + check["speed_high"].values)
-    return chart(
+    return parts.chart(
         "", "", "A right drag law has the same C_d at all speeds; 95 % bars.",
-        x=label("speed through the water", "m/s"), y=label("C_d, relative to the overall value"),
+        x=parts.label("speed through the water", "m/s"),
+        y=parts.label("C_d, relative to the overall value"),
         series=[_with_bars("ranges of speed", middle, value, reach)],
-        marks=[mark("no change", y=0.0)],
+        marks=[parts.mark("no change", y=0.0)],
     )  # fmt: skip
 
 
 def _step_lengths(check: xr.Dataset) -> Section:
-    return _density(check, "step_length", label("step length", "m"), "1/m")
+    return _density(check, "step_length", parts.label("step length", "m"), "1/m")
 
 
 def _turning_angles(check: xr.Dataset) -> Section:
-    return _density(check, "turning_angle", label("turning angle", "rad"), "1/rad")
+    return _density(check, "turning_angle", parts.label("turning angle", "rad"), "1/rad")
 
 
 def _density(check: xr.Dataset, name: str, along: dict[str, Any], unit: str) -> Section:
     if f"{name}_edge" not in check:
         reason = f"No recordings were simulated: {check.attrs.get('ks_left_out', 'left out')}."
-        return empty_section("", "", reason)
-    parts = ("recording", "median", "low", "high")
-    require(check, *(f"{name}_density_{part}" for part in parts))
+        return parts.empty_section("", "", reason)
+    pieces = ("recording", "median", "low", "high")
+    require(check, *(f"{name}_density_{part}" for part in pieces))
     edge = check[f"{name}_edge"].values
-    real, median, low, high = (check[f"{name}_density_{part}"].values for part in parts)
+    real, median, low, high = (check[f"{name}_density_{part}"].values for part in pieces)
     band = value_of(check, "band")
     share = "" if band is None else f" and band of {percent(band)}"
-    return chart(
-        "", "", None, x=along, y=label("density", unit),
+    return parts.chart(
+        "", "", None, x=along, y=parts.label("density", unit),
         series=[
-            series(f"simulated: median{share}", edge, median, ends=(low, high), style="step"),
-            series("recording", edge, real, style="step"),
+            parts.series(f"simulated: median{share}", edge, median, ends=(low, high), style="step"),
+            parts.series("recording", edge, real, style="step"),
         ],
     )  # fmt: skip

@@ -8,22 +8,8 @@ import numpy as np
 
 from driftwalk.core.intervals import proportion_interval
 from driftwalk.core.units import in_percent
-from driftwalk.page.parts import (
-    Maker,
-    Section,
-    attempt,
-    chart,
-    figure,
-    figure_with_ends,
-    label,
-    require,
-    required,
-    sections_of,
-    series,
-    summary_section,
-    table_part,
-    table_section,
-)
+from driftwalk.page import parts
+from driftwalk.page.parts import Maker, Section, require, required
 from driftwalk.page.sections.replay import replay_section
 from driftwalk.schema.answers.control import (
     CONSTANT,
@@ -54,12 +40,14 @@ def policy_sections(*, policy: xr.Dataset | None = None) -> list[Section]:
     >>> [part["kind"] for part in policy_sections()]
     ['empty']
     """
-    parts: list[tuple[str, str, Maker]] = [
+    pieces: list[tuple[str, str, Maker]] = [
         ("rounds", "Rounds of planning", rounds_section),
         ("policy", "Modes chosen", action_sections),
-        table_part("modes", "Modes alone", mode_table),
+        parts.table_part("modes", "Modes alone", mode_table),
     ]
-    return sections_of(policy, "There is no policy yet.", policy_summary, policy_warnings, parts)
+    return parts.sections_of(
+        policy, "There is no policy yet.", policy_summary, policy_warnings, pieces
+    )
 
 
 def policy_summary(policy: xr.Dataset) -> Section:
@@ -72,8 +60,8 @@ def policy_summary(policy: xr.Dataset) -> Section:
         f"and the time left, so that {target} is there at {facts['by_s']:g} s.",
         f"Safe mode, where nothing is seen: {facts['safe_mode']}.",
     ]
-    shown = figure_with_ends(policy, "reached", f"{target} in fresh worlds")
-    return summary_section(paragraphs, [shown])
+    shown = parts.figure_with_ends(policy, "reached", f"{target} in fresh worlds")
+    return parts.summary_section(paragraphs, [shown])
 
 
 def rounds_section(policy: xr.Dataset) -> Section:
@@ -87,7 +75,7 @@ def rounds_section(policy: xr.Dataset) -> Section:
     target = short_class(str(required(policy, "target")))
     columns = ["round", f"share of worlds in {target}", "value iteration (first two rounds)"]
     note = "Value iteration expects too much; only what was reached counts."
-    return table_section("rounds", "Rounds of planning", columns, rows, note)
+    return parts.table_section("rounds", "Rounds of planning", columns, rows, note)
 
 
 def action_sections(policy: xr.Dataset) -> list[Section]:
@@ -101,7 +89,7 @@ def action_sections(policy: xr.Dataset) -> list[Section]:
     ]
     columns = ["class", *(f"after {age:g} s" for age in policy["age"].values)]
     note = f"With {policy['phase'].values[-1]:g} s left or more."
-    return [table_section("policy", "Modes chosen", columns, rows, note)]
+    return [parts.table_section("policy", "Modes chosen", columns, rows, note)]
 
 
 def trial_sections(
@@ -121,15 +109,15 @@ def trial_sections(
     >>> [part["kind"] for part in trial_sections()]
     ['empty']
     """
-    parts: list[tuple[str, str, Maker]] = [
+    pieces: list[tuple[str, str, Maker]] = [
         ("share", "Target over time", share_section),
         ("film", "One run", film_section),
-        table_part("usage", "Modes used", usage_table),
+        parts.table_part("usage", "Modes used", usage_table),
     ]
     nothing = "There is no test yet."
-    made = sections_of(control_test, nothing, trial_summary, lambda _: [], parts)
+    made = parts.sections_of(control_test, nothing, trial_summary, lambda _: [], pieces)
     if path is not None:
-        made += attempt("replay", "The run", lambda: replay_section(path))
+        made += parts.attempt("replay", "The run", lambda: replay_section(path))
     return made
 
 
@@ -144,15 +132,15 @@ def trial_summary(test: xr.Dataset) -> Section:
     ]  # fmt: skip
     ends = (test["reached_low"].values[0], test["reached_high"].values[0])
     gain, *limits = (float(test[f"gain{end}"][CONSTANT]) for end in ("", "_low", "_high"))
-    gained = figure(
+    gained = parts.figure(
         GAIN, gain, ends=(limits[0], limits[1]), confidence=facts["confidence"],
         note=gain_word(test),
     )  # fmt: skip
-    share = figure(
+    share = parts.figure(
         "reached by the policy", test["reached"].values[0], ends=ends,
         confidence=facts["confidence"],
     )  # fmt: skip
-    return summary_section(
+    return parts.summary_section(
         [
             f"{GAIN.capitalize()}, {facts['constant_mode']}: {gain_text(test)}: {gain_word(test)}.",
             f"{required(test, 'worlds')} fresh worlds of each arm, with the same starts and "
@@ -171,11 +159,11 @@ def share_section(test: xr.Dataset) -> Section:
     for name, share in zip(test["arm"].values, test["share"].values, strict=True):
         count = np.rint(share * facts["worlds"])
         ends = proportion_interval(count, facts["worlds"], confidence=facts["confidence"])
-        drawn.append(series(str(name), time, share, ends=ends))
+        drawn.append(parts.series(str(name), time, share, ends=ends))
     target = short_class(str(required(test, "target")))
-    return chart(
+    return parts.chart(
         "share", "Target over time", f"Bands: {in_percent(facts['confidence'])} intervals.",
-        x=label("time", "s"), y=label(f"share of worlds in {target}"), series=drawn,
+        x=parts.label("time", "s"), y=parts.label(f"share of worlds in {target}"), series=drawn,
     )  # fmt: skip
 
 
@@ -189,4 +177,4 @@ def film_section(test: xr.Dataset) -> Section:
             continue
         mode = "" if modes[at] < 0 else str(test["mode"].values[modes[at]])
         rows.append([f"{time:g}", short_class(str(test["class"].values[classes[at]])), mode])
-    return table_section("film", "One run", ["time (s)", "class", "mode from then on"], rows)
+    return parts.table_section("film", "One run", ["time (s)", "class", "mode from then on"], rows)

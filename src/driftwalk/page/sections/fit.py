@@ -10,24 +10,8 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.units import percent
-from driftwalk.page.parts import (
-    SIMULATED,
-    Section,
-    card,
-    chart,
-    count,
-    empty_section,
-    figure,
-    is_simulated,
-    label,
-    quantity,
-    sections_of,
-    series,
-    summary_section,
-    table_section,
-    value_of,
-    verdict_paragraphs,
-)
+from driftwalk.page import parts
+from driftwalk.page.parts import Section, count, is_simulated, quantity, value_of
 from driftwalk.page.sections.check import check_sections
 from driftwalk.page.sections.flow import flow_sections
 from driftwalk.page.sections.recording import Noise, recording_sections
@@ -98,7 +82,7 @@ def fit_sections(
     >>> [part["kind"] for part in fit_sections(None)]
     ['empty']
     """
-    made = sections_of(
+    made = parts.sections_of(
         fit,
         "There is no fit yet.",
         lambda found: fit_summary(found, check),
@@ -107,18 +91,20 @@ def fit_sections(
     )
     noise = None if fit is None else _noise(fit)
     for number_of, recording in enumerate(recordings, start=1):
-        parts = recording_sections(recording, body=body, noise=noise)
+        pieces = recording_sections(recording, body=body, noise=noise)
         if len(recordings) > 1:
-            for part in parts:
+            for part in pieces:
                 part["id"] = f"{part['id']}-of-{number_of}"
                 part["title"] += f" ({number_of} of {len(recordings)})"
-        made += parts
+        made += pieces
     if fit is not None:
         made += flow_sections(fit)
         why = fit.attrs.get("check_left_out")
         if check is None and (why or "verdict" not in fit):
             reason = f"{why}." if why else "The model was not checked against the recording."
-            made.append(empty_section("check", "Does the model explain the recording?", reason))
+            made.append(
+                parts.empty_section("check", "Does the model explain the recording?", reason)
+            )
     if check is not None:
         made += check_sections(check)
     return made
@@ -126,19 +112,19 @@ def fit_sections(
 
 def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
     """Return the answer of a fit in words and numbers."""
-    paragraphs = [SIMULATED] if is_simulated(fit) else []
+    paragraphs = [parts.SIMULATED] if is_simulated(fit) else []
     paragraphs += [_what_was_done(fit), *_verdict(fit, check), _how_far_they_hold(fit)]
     error = value_of(fit, "chi_squared_per_dof")
     # The answer first, then what only some readers need.
     found = sorted(map(_number, model_estimates(fit)), key=lambda pair: pair[0])
-    shown = figure("mean squared error of prediction", error, note="1 if the model is right")
-    return summary_section(paragraphs, [*(one for _, one in found), shown])
+    shown = parts.figure("mean squared error of prediction", error, note="1 if the model is right")
+    return parts.summary_section(paragraphs, [*(one for _, one in found), shown])
 
 
 def _number(one: Estimate) -> tuple[int, dict[str, Any]]:
     """Return the place of an estimate among the numbers, and its card."""
     name = one.number.name
-    return (_ANSWER.index(name) if name in _ANSWER else len(_ANSWER)), card(one)
+    return (_ANSWER.index(name) if name in _ANSWER else len(_ANSWER)), parts.card(one)
 
 
 def _what_was_done(fit: xr.Dataset) -> str:
@@ -146,24 +132,24 @@ def _what_was_done(fit: xr.Dataset) -> str:
     source = facts.get("source", "the recording")
     words = f"driftwalk fitted flow, drag, stochastic force and tracking noise together to {source}"
     samples, used = (value_of(fit, name) for name in ("samples", "samples_used"))
-    parts = []
+    pieces = []
     recordings = value_of(fit, "recordings")
     if recordings is not None and recordings > 1:
-        parts.append(count(int(recordings), "recording"))
+        pieces.append(count(int(recordings), "recording"))
     duration = value_of(fit, "duration_s")
     if duration is not None:
-        parts.append(quantity(duration, "s"))
+        pieces.append(quantity(duration, "s"))
     if samples is not None and used is not None:
-        parts.append(f"{int(used)} of {int(samples)} samples used")
+        pieces.append(f"{int(used)} of {int(samples)} samples used")
     left_out, put_in = (value_of(fit, name) for name in ("mistakes", "dropped_frames"))
     if left_out:
-        parts.append(f"{int(left_out)} left out as mistakes of the tracker")
+        pieces.append(f"{int(left_out)} left out as mistakes of the tracker")
     if put_in:
-        parts.append(f"the time of {count(int(put_in), 'dropped frame')} put in")
+        pieces.append(f"the time of {count(int(put_in), 'dropped frame')} put in")
     wall = value_of(fit, "wall_share")
     if wall is not None:
-        parts.append(f"{percent(wall)} of the intervals at the wall, left out")
-    words += f" ({'; '.join(parts)})" if parts else ""
+        pieces.append(f"{percent(wall)} of the intervals at the wall, left out")
+    words += f" ({'; '.join(pieces)})" if pieces else ""
     visited = value_of(fit, "visited_share")
     seen = "" if visited is None else f" The block has been over {percent(visited)} of the tank."
     return f"{words}.{seen}"
@@ -197,7 +183,7 @@ def _how_far_they_hold(fit: xr.Dataset) -> str:
 
 def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
     """Return the verdict and its reasons, and the KS distance of a check."""
-    said = verdict_paragraphs(
+    said = parts.verdict_paragraphs(
         stored_verdict(fit if check is None else check),
         str(fit.attrs.get("check_left_out", "")),
         more="The check found no evidence against the model. It finds many faults, but not all.",
@@ -231,20 +217,26 @@ def law_sections(fit: xr.Dataset) -> list[Section]:
     rows = law_words(facts)
     if rows:
         said = [f"{label[:1].upper()}{label[1:]}: {words}." for label, words in rows.items()]
-        shown = [card(one) for one in law_estimates(fit)]
+        shown = [parts.card(one) for one in law_estimates(fit)]
         if "law_settled_by" in facts:
             note = "difference of the logarithms of the evidence; below 3 the recording cannot tell"
             apart = facts["law_settled_by"]
-            shown.insert(0, figure("evidence for this law over the other", apart, note=note))
+            shown.insert(0, parts.figure("evidence for this law over the other", apart, note=note))
         made.append(
-            summary_section([*said, *law_limits(facts)], shown, id="law", title="The force law")
+            parts.summary_section(
+                [*said, *law_limits(facts)], shown, id="law", title="The force law"
+            )
         )
     made += [part for part in (_shared(fit), _compared(fit), _tested(fit)) if part is not None]
     lacking, walls = fit.attrs.get("wall_left_out"), wall_estimates(fit)
     if lacking is not None or walls:
         words = f"The block touched the wall in {facts['wall_contacts']} passages."
         paragraphs = [words if lacking is None else f"The wall: {lacking}."]
-        made.append(summary_section(paragraphs, [*map(card, walls)], id="wall", title="The wall"))
+        made.append(
+            parts.summary_section(
+                paragraphs, [*map(parts.card, walls)], id="wall", title="The wall"
+            )
+        )
     return made
 
 
@@ -258,16 +250,16 @@ def _shared(fit: xr.Dataset) -> Section | None:
         np.exp(-0.5 * (r / max(length, 1e-9)) ** 2) for length in shared_lengths(fit)
     )
     low_end, high_end = fit["force_correlation_interval"].values.T
-    return chart(
+    return parts.chart(
         "stirring",
         "Shared stirring",
         "Correlation of the stochastic forces on two bodies against their distance: measured, and "
         "the fitted exp(-r²/2L²) with the band of its interval.",
-        x=label("distance of the bodies", "m"),
-        y=label("correlation of the forces"),
+        x=parts.label("distance of the bodies", "m"),
+        y=parts.label("correlation of the forces"),
         series=[
-            series("fitted", r, fitted, ends=(low, high)),
-            series(
+            parts.series("fitted", r, fitted, ends=(low, high)),
+            parts.series(
                 "at each distance", distance, fit["force_correlation"].values,
                 ends=(low_end, high_end), style="points",
             ),
@@ -289,7 +281,7 @@ def _compared(fit: xr.Dataset) -> Section | None:
         "Each law was fitted to the first 70 % of the recording and predicted the rest. Loss and "
         "evidence are logarithms, against the best law. A dash: the law has no solution."
     )
-    return table_section("laws", "Force laws compared", columns, rows, note)
+    return parts.table_section("laws", "Force laws compared", columns, rows, note)
 
 
 def _tested(fit: xr.Dataset) -> Section | None:
@@ -313,7 +305,7 @@ def _tested(fit: xr.Dataset) -> Section | None:
         "one: the check of the model says whether anything is missing from it."
     )
     columns = ["what was tested", "standard deviations from the model", "why it is not in the fit"]
-    return table_section("tested", "Tested, and not in the fit", columns, rows, note)
+    return parts.table_section("tested", "Tested, and not in the fit", columns, rows, note)
 
 
 def _why(name: str, sigmas: float) -> str:

@@ -8,21 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.units import percent
-from driftwalk.page.parts import (
-    Maker,
-    Section,
-    figure,
-    quantity,
-    require,
-    required,
-    section,
-    section_of_table,
-    sections_of,
-    summary_section,
-    table_part,
-    table_section,
-    value_of,
-)
+from driftwalk.page import parts
+from driftwalk.page.parts import Maker, Section, quantity, require, required, value_of
 from driftwalk.page.sections.outcomes import cells_of, class_times_section
 from driftwalk.plot.kinetics import class_graph_of, placed_arrows
 from driftwalk.plot.parts.polyomino_sketch import are_discs
@@ -66,22 +53,22 @@ def kinetics_sections(*, kinetics: xr.Dataset | None = None) -> list[Section]:
     >>> [part["kind"] for part in kinetics_sections()]
     ['empty']
     """
-    parts: list[tuple[str, str, Maker]] = [
+    pieces: list[tuple[str, str, Maker]] = [
         ("shares", "Shares over time", shares_sections),
         ("graph", "Graph of the classes", graph_section),
         ("rates", "Rates", rates_sections),
         ("tests", "Tests of a well-mixed tank", mixing_section),
-        table_part("models", "Models", score_table),
+        parts.table_part("models", "Models", score_table),
     ]
     if kinetics is not None and "target" in kinetics.attrs:
         title = "Way to the target"
-        way = table_part("target", title, target_table)
-        parts.insert(0, way)
+        way = parts.table_part("target", title, target_table)
+        pieces.insert(0, way)
     if kinetics is not None and kinetics.sizes.get("source") == 2:
         name = "Equal rates"
-        parts.append(table_part("equal", name, equal_table))
+        pieces.append(parts.table_part("equal", name, equal_table))
     nothing = "There are no rates yet."
-    return sections_of(kinetics, nothing, kinetics_summary, lambda _: [], parts)
+    return parts.sections_of(kinetics, nothing, kinetics_summary, lambda _: [], pieces)
 
 
 def kinetics_summary(kinetics: xr.Dataset) -> Section:
@@ -106,12 +93,14 @@ def kinetics_summary(kinetics: xr.Dataset) -> Section:
         paragraphs.insert(0, f"{target_words(kinetics)}.")
         shown += _target_figures(kinetics)
     shown += [
-        figure("KS distance of completion times", value_of(kinetics, "completion_ks"), note=note)
+        parts.figure(
+            "KS distance of completion times", value_of(kinetics, "completion_ks"), note=note
+        )
     ]
     if "other_blocks_rate_per_s" in facts:
         words = f"first join of {facts['other_blocks']} blocks, extrapolated"
-        shown.append(figure(words, value_of(kinetics, "other_blocks_rate_per_s"), "s-1"))
-    return summary_section(paragraphs, shown)
+        shown.append(parts.figure(words, value_of(kinetics, "other_blocks_rate_per_s"), "s-1"))
+    return parts.summary_section(paragraphs, shown)
 
 
 def _target_figures(kinetics: xr.Dataset) -> list[dict[str, Any]]:
@@ -126,7 +115,7 @@ def _target_figures(kinetics: xr.Dataset) -> list[dict[str, Any]]:
         value, error = (float(one[f"{name}{end}"]) for end in ("", "_standard_error"))
         if math.isfinite(error):
             note = f"± {quantity(error, unit, digits=2)} (one standard error)"
-            made.append(figure(text, value, unit, note=note))
+            made.append(parts.figure(text, value, unit, note=note))
     return made
 
 
@@ -157,7 +146,7 @@ def graph_section(kinetics: xr.Dataset) -> Section:
     """Return the classes by their number of assemblies, and the rates between them as arrows."""
     place, rows, kept, title = class_graph_of(kinetics)
     unit = np.array([GRAPH_PX, ROW_PX * rows])
-    return section(
+    return parts.section(
         "graph", "class_graph", "Graph of the classes", f"{title.capitalize()}.",
         height=float(unit[1]),
         classes=[
@@ -180,7 +169,7 @@ def rates_sections(kinetics: xr.Dataset) -> list[Section]:
     require(kinetics, "count", "rate", "rate_low", "rate_high")
     tables = (rate_table(kinetics, at) for at in range(kinetics.sizes["source"]))
     return [
-        section_of_table(f"rates-{at}", f"Rates, {one.title}" if one.title else "Rates", one)
+        parts.section_of_table(f"rates-{at}", f"Rates, {one.title}" if one.title else "Rates", one)
         for at, one in enumerate(tables, start=1)
     ]
 
@@ -198,4 +187,4 @@ def mixing_section(kinetics: xr.Dataset) -> Section:
         "(0: no memory). The p-values are corrected by Holm's method."
     )
     columns = ["test", "events", "statistic", "from", "to (90 %)", "p", "p, corrected"]
-    return table_section("tests", "Tests of a well-mixed tank", columns, rows, note)
+    return parts.table_section("tests", "Tests of a well-mixed tank", columns, rows, note)

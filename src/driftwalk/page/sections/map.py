@@ -9,17 +9,9 @@ import numpy as np
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.units import percent
+from driftwalk.page import parts
 from driftwalk.page.arrays import binary_step, encode_array, numbers, plain_list
-from driftwalk.page.parts import (
-    Section,
-    arena_part,
-    axis,
-    label as chart_label,
-    quantity,
-    require,
-    section,
-    value_of,
-)
+from driftwalk.page.parts import Section, quantity, require, value_of
 from driftwalk.plot.distances import CAUSES, UNKNOWN_CAUSE
 from driftwalk.plot.parts.labels import force_interval_text
 from driftwalk.schema import body_track
@@ -61,9 +53,9 @@ class PageParameter(NamedTuple):
         if self.symbol == FORCE.symbol and "force_interval_s" in facts_of(dataset):
             every = f", {force_interval_text(dataset)}"
         words = f"{self.words}{every}"
-        found = axis(self.name, words, self.unit, dataset[f"{prefix}{self.name}"].values)
+        found = parts.axis(self.name, words, self.unit, dataset[f"{prefix}{self.name}"].values)
         if self.scale == "log":
-            found |= {"log": chart_label(words, self.unit, log=True)["log"]}
+            found |= {"log": parts.label(words, self.unit, log=True)["log"]}
         return found
 
 
@@ -114,7 +106,7 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
     distance = _plane(calibration, "ks_distance")
     status, causes = _status(calibration, distance)
     cells = _cells(calibration)
-    return section(
+    return parts.section(
         "map", "map", "How well each setting explains the recording", _note(calibration, cells),
         x=across.axis(calibration),
         y=up.axis(calibration),
@@ -132,7 +124,7 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
         refined=_refined(calibration),
         cells=cells,
         recording=_recording(calibration, recording),
-        arena=None if recording is None else arena_part(recording),
+        arena=None if recording is None else parts.arena_part(recording),
     )  # fmt: skip
 
 

@@ -6,25 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.page import parts
 from driftwalk.page.arrays import number
-from driftwalk.page.parts import (
-    Section,
-    cell,
-    chart,
-    figure,
-    label,
-    mark,
-    quantity,
-    require,
-    required,
-    section_of_table,
-    sections_of,
-    series,
-    stated_warnings,
-    summary_section,
-    table_section,
-    verdict_paragraphs,
-)
+from driftwalk.page.parts import Section, cell, quantity, require, required
 from driftwalk.page.sections.recording import recording_sections
 from driftwalk.schema.answers.model_comparison import (
     ASPECT_WORDS,
@@ -68,14 +52,16 @@ def model_calibration_sections(
     >>> [part["kind"] for part in model_calibration_sections(None)]
     ['empty']
     """
-    parts = (
+    pieces = (
         ("values", "Values", values_section),
         ("draws", "How well they are known", draws_section),
         ("aspects", "Aspects", aspects_section),
         ("checks", "Facts that were not fitted", checks_section),
     )
     nothing = "The calibration has no result yet."
-    made = sections_of(model_calibration, nothing, calibration_summary, stated_warnings, parts)
+    made = parts.sections_of(
+        model_calibration, nothing, calibration_summary, parts.stated_warnings, pieces
+    )
     if recording is not None:
         made += recording_sections(recording, body=body)
     return made
@@ -89,19 +75,19 @@ def calibration_summary(found: xr.Dataset) -> Section:
     model = required(found, "model")
     paragraphs = [
         f"The model {model} was calibrated on the recording.",
-        *verdict_paragraphs(stored_verdict(found)),
+        *parts.verdict_paragraphs(stored_verdict(found)),
         f"The recording determines {len(known)} of {len(names)} parameters"
         f"{': ' + ', '.join(known) if known else ''}.",
     ]
     shown = [
-        figure("distance from held-out blocks", found["score"]),
-        figure("step interval", required(found, "step_interval_s"), "s"),
-        figure("duration", required(found, "duration_s"), "s"),
+        parts.figure("distance from held-out blocks", found["score"]),
+        parts.figure("step interval", required(found, "step_interval_s"), "s"),
+        parts.figure("duration", required(found, "duration_s"), "s"),
     ]
     if "misfit" in found:
-        shown.append(figure("misfit of the summaries", found["misfit"]))
-        shown.append(figure("usual misfit", found["usual_misfit"]))
-    return summary_section(paragraphs, shown)
+        shown.append(parts.figure("misfit of the summaries", found["misfit"]))
+        shown.append(parts.figure("usual misfit", found["usual_misfit"]))
+    return parts.summary_section(paragraphs, shown)
 
 
 def values_section(found: xr.Dataset) -> Section:
@@ -120,7 +106,7 @@ def values_section(found: xr.Dataset) -> Section:
                 str(one["meaning"].values),
             ]
         )
-    return table_section(
+    return parts.table_section(
         "values", "Values",
         ["parameter", "value", "interval", "determined", "range", "meaning"], rows,
         "A parameter is determined where its 90 % interval ends within 15 % of its value, "
@@ -135,11 +121,11 @@ def draws_section(found: xr.Dataset) -> Section:
     for one in each(found, "parameter"):
         values = np.sort(one["draws"].values) / float(one["estimate"])
         share = np.linspace(0.0, 1.0, values.size)
-        drawn.append(series(str(one["parameter"].values), values, share))
-    return chart(
+        drawn.append(parts.series(str(one["parameter"].values), values, share))
+    return parts.chart(
         "draws", "How well they are known",
         "Share of the draws below a value, over the estimate: the steeper, the better known.",
-        x=label("value / estimate"), y=label("share of the draws"), series=drawn,
+        x=parts.label("value / estimate"), y=parts.label("share of the draws"), series=drawn,
     )  # fmt: skip
 
 
@@ -148,7 +134,7 @@ def aspects_section(found: xr.Dataset) -> Section:
     names = ("held_out_distance", "trained_distance", "own_distance", "floor")
     require(found, *names)
     rows = [[_aspect(one), *(number(one[name]) for name in names)] for one in each(found, "aspect")]
-    return table_section(
+    return parts.table_section(
         "aspects", "Aspects",
         ["aspect", "not seen", "seen", "the recording's own parts", "floor"], rows,
         "KS distance from blocks of time that the answer has not seen, and from those it has.",
@@ -157,14 +143,14 @@ def aspects_section(found: xr.Dataset) -> Section:
 
 def checks_section(found: xr.Dataset) -> Section:
     """Return the table of facts of one model that were not fitted."""
-    parts = ["check_recorded", *(f"check_{name}" for name in ("median", "low", "high"))]
-    require(found, "check_unit", *parts)
+    pieces = ["check_recorded", *(f"check_{name}" for name in ("median", "low", "high"))]
+    require(found, "check_unit", *pieces)
     rows = []
     for one in each(found, "check"):
         unit = str(one["check_unit"].values)
-        rows.append([_check(one), *(cell(float(one[part]), unit) for part in parts)])
+        rows.append([_check(one), *(cell(float(one[part]), unit) for part in pieces)])
     columns = ["fact", "recording", "median", "smallest", "largest"]
-    return table_section("checks", "Facts that were not fitted", columns, rows, _CHECKS_NOTE)
+    return parts.table_section("checks", "Facts that were not fitted", columns, rows, _CHECKS_NOTE)
 
 
 def model_sections(
@@ -192,7 +178,7 @@ def model_sections(
     ['empty']
     """
     by_summaries = comparison is not None and "asked" in comparison
-    parts = (
+    pieces = (
         ("ranking", "Ranking", ranking_section),
         *((("summaries", "Summaries of the motion", summaries_section),) if by_summaries else ()),
         ("scores", "Distances", scores_section),
@@ -202,7 +188,7 @@ def model_sections(
         ("values", "Values", compared_values),
     )
     nothing = "No model has been compared yet."
-    made = sections_of(comparison, nothing, models_summary, stated_warnings, parts)
+    made = parts.sections_of(comparison, nothing, models_summary, parts.stated_warnings, pieces)
     if recording is not None:
         made += recording_sections(recording, body=body)
     return made
@@ -219,11 +205,11 @@ def models_summary(comparison: xr.Dataset) -> Section:
     ]
     best = comparison.isel(model=0)
     shown = [
-        figure(f"distance of {best['model'].item()}", best["score"]),
-        figure("distance of the recording's own parts", own_score(comparison)),
-        figure("step interval", required(comparison, "step_interval_s"), "s"),
+        parts.figure(f"distance of {best['model'].item()}", best["score"]),
+        parts.figure("distance of the recording's own parts", own_score(comparison)),
+        parts.figure("step interval", required(comparison, "step_interval_s"), "s"),
     ]
-    return summary_section(paragraphs, shown)
+    return parts.summary_section(paragraphs, shown)
 
 
 def ranking_section(comparison: xr.Dataset) -> Section:
@@ -231,7 +217,7 @@ def ranking_section(comparison: xr.Dataset) -> Section:
     require(comparison, "score", "score_std", "behind", "behind_std", "held_out_distance")
     table = ranking_table(comparison)
     note = "Distance from blocks of time that no model was fitted to."
-    return section_of_table("ranking", "Ranking", table, note)
+    return parts.section_of_table("ranking", "Ranking", table, note)
 
 
 def summaries_section(comparison: xr.Dataset) -> Section:
@@ -250,7 +236,7 @@ def summaries_section(comparison: xr.Dataset) -> Section:
         for one in each(asked, "model")
     ]
     columns = ["model", "misfit", "of own recordings, median", "99 % below", "less likely by"]
-    return table_section(
+    return parts.table_section(
         "summaries", "Summaries of the motion", [*columns, "named"], rows,
         "About a hundred numbers of the motion, matched by the closest models. The "
         "misfit is compared with those of the model's own simulated recordings; the evidence, as "
@@ -265,7 +251,7 @@ def scores_section(comparison: xr.Dataset) -> Section:
     score, std = comparison["score"].values, comparison["score_std"].values
     walk = comparison["baseline"].values.astype(bool)
     drawn = [
-        series(
+        parts.series(
             words,
             place,
             np.where(of, score, np.nan),
@@ -275,10 +261,10 @@ def scores_section(comparison: xr.Dataset) -> Section:
         for words, of in (("motion models", ~walk), ("walks of recorded steps", walk))
         if of.any()
     ]
-    return chart(
+    return parts.chart(
         "scores", "Distances", "In the order of the ranking, with standard errors.",
-        x=label("place in the ranking"), y=label("distance, mean of D / floor"), series=drawn,
-        marks=[mark("the recording's own parts", y=own_score(comparison))],
+        x=parts.label("place in the ranking"), y=parts.label("distance, mean of D / floor"),
+        series=drawn, marks=[parts.mark("the recording's own parts", y=own_score(comparison))],
     )  # fmt: skip
 
 
@@ -287,7 +273,7 @@ def verdicts_section(comparison: xr.Dataset) -> Section:
     require(comparison, "verdict", "verdict_reason")
     columns = [comparison[name].values for name in ("model", "verdict", "verdict_reason")]
     rows = [list(map(str, row)) for row in zip(*columns, strict=True)]
-    return table_section("verdicts", "Verdicts", ["model", "verdict", "why"], rows)
+    return parts.table_section("verdicts", "Verdicts", ["model", "verdict", "why"], rows)
 
 
 def compared_aspects(comparison: xr.Dataset) -> Section:
@@ -302,23 +288,23 @@ def compared_aspects(comparison: xr.Dataset) -> Section:
     rows = [[name, *map(number, row)] for name, row in zip(names, distances, strict=True)]
     columns = ["model", *map(_aspect, each(comparison[["floor"]], "aspect"))]
     note = "KS distance from the held-out blocks."
-    return table_section("aspects", "Aspects", columns, rows, note)
+    return parts.table_section("aspects", "Aspects", columns, rows, note)
 
 
 def compared_checks(comparison: xr.Dataset) -> Section:
     """Return the table of facts of every model that were not fitted."""
-    parts = [f"check_{name}" for name in ("low", "median", "high")]
-    require(comparison, "check_recorded", "check_unit", *parts)
+    pieces = [f"check_{name}" for name in ("low", "median", "high")]
+    require(comparison, "check_recorded", "check_unit", *pieces)
     rows = []
-    for one in each(comparison[["check_recorded", "check_unit", *parts]], "check"):
+    for one in each(comparison[["check_recorded", "check_unit", *pieces]], "check"):
         unit = str(one["check_unit"].values)
         cells = [cell(float(one["check_recorded"]), unit)]
         for of in each(one, "model"):
-            low, middle, high = (cell(float(of[part]), unit) for part in parts)
+            low, middle, high = (cell(float(of[part]), unit) for part in pieces)
             cells.append(f"{middle} ({low} to {high})")
         rows.append([_check(one), *cells])
     columns = ["fact", "recording", *map(str, comparison["model"].values)]
-    return table_section("checks", "Facts that were not fitted", columns, rows, _CHECKS_NOTE)
+    return parts.table_section("checks", "Facts that were not fitted", columns, rows, _CHECKS_NOTE)
 
 
 def compared_values(comparison: xr.Dataset) -> Section:
@@ -334,7 +320,7 @@ def compared_values(comparison: xr.Dataset) -> Section:
         for one in each(model, "parameter")
         if np.isfinite(one["estimate"])
     ]
-    return table_section(
+    return parts.table_section(
         "values", "Values", ["model", "parameter", "value"], rows,
         "The answer of each search. A model that does not explain the recording has values, too: "
         "they mean little.",

@@ -6,20 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.page.parts import (
-    Maker,
-    Section,
-    chart,
-    figure,
-    label,
-    require,
-    required,
-    section_of_table,
-    sections_of,
-    series,
-    summary_section,
-    table_part,
-)
+from driftwalk.page import parts
+from driftwalk.page.parts import Maker, Section, require, required
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.outcome_posterior import (
     agreement,
@@ -56,13 +44,13 @@ def outcome_posterior_sections(*, posterior: xr.Dataset | None = None) -> list[S
     >>> [part["kind"] for part in outcome_posterior_sections()]
     ['empty']
     """
-    parts: list[tuple[str, str, Maker]] = [
+    pieces: list[tuple[str, str, Maker]] = [
         ("posterior", "Posterior", density_sections),
-        table_part("classes", "Classes", class_table),
+        parts.table_part("classes", "Classes", class_table),
         ("data", "Information in each kind of data", _data_section),
     ]
     nothing = "The emulator is not checked yet: there is no posterior."
-    return sections_of(posterior, nothing, posterior_summary, lambda _: [], parts)
+    return parts.sections_of(posterior, nothing, posterior_summary, lambda _: [], pieces)
 
 
 def posterior_summary(posterior: xr.Dataset) -> Section:
@@ -82,7 +70,7 @@ def posterior_summary(posterior: xr.Dataset) -> Section:
         number, known = number_of(one), bool(one["determined"])
         ends = tuple(one["interval"].values.tolist()) if known else (None, None)
         shown.append(
-            figure(
+            parts.figure(
                 number.plain,
                 float(one["estimate"]) if known else None,
                 number.unit,
@@ -92,7 +80,7 @@ def posterior_summary(posterior: xr.Dataset) -> Section:
                 confidence=confidence if known else None,
             )
         )
-    return summary_section(paragraphs, shown)
+    return parts.summary_section(paragraphs, shown)
 
 
 def density_sections(posterior: xr.Dataset) -> list[Section]:
@@ -109,13 +97,13 @@ def density_sections(posterior: xr.Dataset) -> list[Section]:
         flat = np.full(BINS, 1.0 / (ends[1] - ends[0]))
         name = number.plain
         drawn = [
-            series("posterior", edges, density * (ends[1] - ends[0]), style="step"),
-            series("without data", edges, flat * (ends[1] - ends[0]), style="step"),
+            parts.series("posterior", edges, density * (ends[1] - ends[0]), style="step"),
+            parts.series("without data", edges, flat * (ends[1] - ends[0]), style="step"),
         ]
         made.append(
-            chart(
+            parts.chart(
                 f"posterior-{at + 1}", f"Posterior of {name} {condition(posterior)}".rstrip(),
-                x=label(number.words, number.unit), y=label("density over the prior"),
+                x=parts.label(number.words, number.unit), y=parts.label("density over the prior"),
                 series=drawn,
             )
         )  # fmt: skip
@@ -129,4 +117,4 @@ def _data_section(posterior: xr.Dataset) -> Section:
         "intervals are medians, over those that hold without data."
     )
     table = data_table(posterior)
-    return section_of_table("data", "Information in each kind of data", table, note)
+    return parts.section_of_table("data", "Information in each kind of data", table, note)

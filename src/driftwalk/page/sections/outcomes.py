@@ -9,20 +9,9 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.units import percent
+from driftwalk.page import parts
 from driftwalk.page.arrays import number, numbers
-from driftwalk.page.parts import (
-    Section,
-    attempt,
-    chart,
-    count,
-    figure,
-    figure_with_ends,
-    label,
-    require,
-    section,
-    series,
-    value_of,
-)
+from driftwalk.page.parts import Section, count, require, value_of
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
 from driftwalk.plot.parts.polyomino_sketch import are_discs, class_cells, is_class
 
@@ -70,7 +59,7 @@ def classes_section(
     first = next(iter(found.values()))
     confidence = value_of(first, "confidence")
     items = {name: class_items(one, names, shown) for name, one in found.items()}
-    return section(
+    return parts.section(
         id, "classes", title,
         None if confidence is None else f"{percent(confidence)} simultaneous intervals.",
         confidence=confidence,
@@ -110,7 +99,7 @@ def class_times_section(times: xr.Dataset) -> Section:
     ]  # fmt: skip
     if len(shown) < len(names):
         classes.append(_class_course(OTHER, with_rest(share, shown)[-1], None, None))
-    return section(
+    return parts.section(
         "class-times", "class_times", "Outcome classes over time",
         time=numbers(thin["time"].values), classes=classes,
     )  # fmt: skip
@@ -173,7 +162,7 @@ def size_sections(found: dict[str, xr.Dataset]) -> list[Section]:
     ratio = "least perimeter over perimeter"
     shares = {"largest_share": "in the largest assembly", "free_share": "alone"}
     return [
-        *attempt("sizes", "Sizes of the assemblies", lambda: sizes_section(found)),
+        *parts.attempt("sizes", "Sizes of the assemblies", lambda: sizes_section(found)),
         *_over_time(found, "mean-size", "Mean size over time", "blocks per assembly", mean),
         *_over_time(found, "size-shares", title, "share of the blocks", shares),
         *(
@@ -188,10 +177,10 @@ def _over_time(
     found: dict[str, xr.Dataset], id: str, title: str, words: str, names: dict[str, str]
 ) -> list[Section]:
     def section_of() -> Section:
-        time, drawn = label("time", "s"), _courses(found, names)
-        return chart(id, title, _note(found), x=time, y=label(words), series=drawn)
+        time, drawn = parts.label("time", "s"), _courses(found, names)
+        return parts.chart(id, title, _note(found), x=time, y=parts.label(words), series=drawn)
 
-    return attempt(id, title, section_of)
+    return parts.attempt(id, title, section_of)
 
 
 def sizes_section(found: dict[str, xr.Dataset]) -> Section:
@@ -217,9 +206,10 @@ def sizes_section(found: dict[str, xr.Dataset]) -> Section:
         drawn.append(_series(name, middle, one, "block_share", style="points"))
     grouped = "Sizes that share a point, at their geometric mean"
     note = f"{grouped}: {', '.join(groups)}. " if groups else ""
-    return chart(
+    return parts.chart(
         "sizes", "Sizes of the assemblies", f"At the end of the runs. {note}{_note(found)}",
-        x=label("blocks in the assembly", log=True), y=label("share of the blocks"), series=drawn,
+        x=parts.label("blocks in the assembly", log=True), y=parts.label("share of the blocks"),
+        series=drawn,
     )  # fmt: skip
 
 
@@ -233,13 +223,13 @@ def size_numbers(sizes: xr.Dataset) -> list[dict[str, Any]]:
     }
     confidence = value_of(sizes, "confidence")
     shown = [
-        figure(
+        parts.figure(
             text, end[name], ends=(end[f"{name}_low"], end[f"{name}_high"]), confidence=confidence
         )
         for name, text in words.items()
     ]
     note = "least perimeter over perimeter"
-    return [*shown, figure_with_ends(sizes, "compactness", "compactness", note=note)]
+    return [*shown, parts.figure_with_ends(sizes, "compactness", "compactness", note=note)]
 
 
 def _courses(found: dict[str, xr.Dataset], names: dict[str, str]) -> list[dict[str, Any]]:
@@ -255,7 +245,7 @@ def _courses(found: dict[str, xr.Dataset], names: dict[str, str]) -> list[dict[s
 
 def _series(name: str, x: Any, found: xr.Dataset, of: str, **how: Any) -> dict[str, Any]:
     ends = (found[f"{of}_low"].values, found[f"{of}_high"].values)
-    return series(name, x, found[of].values, ends=ends, **how)
+    return parts.series(name, x, found[of].values, ends=ends, **how)
 
 
 def _note(found: dict[str, xr.Dataset]) -> str:

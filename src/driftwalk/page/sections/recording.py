@@ -11,19 +11,9 @@ import numpy as np
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.units import percent
+from driftwalk.page import parts
 from driftwalk.page.arrays import binary_step, encode_array, number, plain_list
-from driftwalk.page.parts import (
-    SIMULATED,
-    Section,
-    arena_part,
-    attempt,
-    count,
-    figure,
-    is_simulated,
-    quantity,
-    section,
-    summary_section,
-)
+from driftwalk.page.parts import Section, count, is_simulated, quantity
 from driftwalk.plot.tank import GAP_INTERVALS
 from driftwalk.schema import Track, body_names, body_track, check_trajectory
 
@@ -97,7 +87,7 @@ def recording_sections(
     noises = _by_body(noise, chosen)
     made: list[Section] = []
     for number_of, name in enumerate(chosen, start=1):
-        made += attempt(
+        made += parts.attempt(
             f"recording-{number_of}",
             "The recording" if len(names) == 1 else f"The recording, body {name}",
             partial(
@@ -169,7 +159,7 @@ def trajectory_section(
         else None,
     }
     speed = np.hypot(np.diff(track.x), np.diff(track.y))[~gap] / interval[~gap]
-    notes = [SIMULATED] if is_simulated(trajectory) else []
+    notes = [parts.SIMULATED] if is_simulated(trajectory) else []
     if every > 1:
         notes.append(f"One position in {every} is shown.")
     notes.append(f"Positions are shown to {quantity(step, 'm', digits=2)}.")
@@ -182,9 +172,9 @@ def trajectory_section(
         )
     names = body_names(trajectory)
     title = "The recording" if len(names) == 1 else f"The recording, body {body}"
-    return section(
+    return parts.section(
         id, "trajectory", title, " ".join(notes),
-        arena=arena_part(trajectory),
+        arena=parts.arena_part(trajectory),
         **path,
         gaps=_gaps(track, interval, gap),
         speed=_speed_density(speed, top),
@@ -273,19 +263,21 @@ def _facts(
     usual = float(np.median(interval))
     duration = float(track.time[-1] - track.time[0])
     facts = [
-        figure("positions", track.time.size),
-        figure("duration", duration, "s"),
-        figure("rate", 1.0 / usual, "Hz"),
-        figure("gaps", int(gap.sum())),
-        figure("time in gaps", 100.0 * float((interval[gap] - usual).sum()) / duration, "%"),
-        figure("mean speed", speed.mean() if speed.size else None, "m/s"),
-        figure(
+        parts.figure("positions", track.time.size),
+        parts.figure("duration", duration, "s"),
+        parts.figure("rate", 1.0 / usual, "Hz"),
+        parts.figure("gaps", int(gap.sum())),
+        parts.figure("time in gaps", 100.0 * float((interval[gap] - usual).sum()) / duration, "%"),
+        parts.figure("mean speed", speed.mean() if speed.size else None, "m/s"),
+        parts.figure(
             "99 % of speeds are below", np.percentile(speed, 99.0) if speed.size else None, "m/s"
         ),
     ]
     if noise is not None:
         ends = (noise.low, noise.high)
-        facts.append(figure("tracking noise", noise.position, "m", note=noise.source, ends=ends))
+        facts.append(
+            parts.figure("tracking noise", noise.position, "m", note=noise.source, ends=ends)
+        )
     return facts
 
 
@@ -296,7 +288,7 @@ def _ambiguity(trajectory: xr.Dataset, body: str | None) -> list[dict[str, Any]]
     scores = trajectory["ambiguous"].transpose("time", "body").values
     which = 0 if body is None else body_names(trajectory).index(body)
     share = 100.0 * float((scores[:, which] > 0.0).mean())
-    return [figure("identity ambiguous", share, "%", note="share of the time")]
+    return [parts.figure("identity ambiguous", share, "%", note="share of the time")]
 
 
 def tracking_sections(tracking: Mapping[str, Any] | None) -> list[Section]:
@@ -323,11 +315,11 @@ def tracking_sections(tracking: Mapping[str, Any] | None) -> list[Section]:
         listed = ", ".join(f"{reason} {number}" for reason, number in rejected.items())
         words.append(f"Candidates rejected, over all frames: {listed}.")
     numbers = [
-        figure(label, tracking[key], note=note)
+        parts.figure(label, tracking[key], note=note)
         for key, (label, note) in COUNTED.items()
         if key in tracking
     ]
-    return [summary_section(words, numbers, id="tracking", title="Tracking")]
+    return [parts.summary_section(words, numbers, id="tracking", title="Tracking")]
 
 
 def tracking_warnings(tracking: Mapping[str, Any] | None) -> list[str]:

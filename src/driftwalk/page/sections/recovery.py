@@ -11,26 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.units import percent
+from driftwalk.page import parts
 from driftwalk.page.arrays import number
-from driftwalk.page.parts import (
-    Maker,
-    Section,
-    answer_table,
-    chart,
-    count,
-    figure,
-    label,
-    mark,
-    quantity,
-    require,
-    required,
-    section_of_table,
-    sections_of,
-    series,
-    summary_section,
-    table_section,
-    value_of,
-)
+from driftwalk.page.parts import Maker, Section, count, quantity, require, required, value_of
 from driftwalk.schema.answers.parts import each
 from driftwalk.schema.answers.recovery import model_recovery_answer, model_warnings, recovery_answer
 from driftwalk.schema.kinds.recovery import RECOVERED
@@ -62,7 +45,7 @@ def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
     >>> [part["kind"] for part in recovery_sections(None)]
     ['empty']
     """
-    parts: tuple[tuple[str, str, Maker], ...] = (
+    pieces: tuple[tuple[str, str, Maker], ...] = (
         ("errors", "Errors and intervals", errors_section),
         ("by-length", "Error by length", by_length_section),
         *(
@@ -73,8 +56,8 @@ def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
     )
     reason = _obstacle(recovery, MOST_WAYS, "duration", "angle", "parameter")
     found = None if reason else recovery
-    return sections_of(
-        found, reason, recovery_summary, lambda found: recovery_answer(found).warnings, parts
+    return parts.sections_of(
+        found, reason, recovery_summary, lambda found: recovery_answer(found).warnings, pieces
     )
 
 
@@ -111,7 +94,7 @@ def recovery_summary(recovery: xr.Dataset) -> Section:
         *_found(recovery),
     ]
     shown = [
-        figure(one.words, required(recovery, one.key), one.unit, note="truth")
+        parts.figure(one.words, required(recovery, one.key), one.unit, note="truth")
         for one in RECOVERED.values()
     ]
     wanted = value_of(recovery, "drag_coefficient_precision")
@@ -121,8 +104,10 @@ def recovery_summary(recovery: xr.Dataset) -> Section:
         if needed is not None:
             words, within = f"length needed, angle {part['angle'].item()}", (low, high)
             confidence = value_of(recovery, "needed_confidence")
-            shown.append(figure(words, needed, "s", note=note, ends=within, confidence=confidence))
-    return summary_section(paragraphs, shown)
+            shown.append(
+                parts.figure(words, needed, "s", note=note, ends=within, confidence=confidence)
+            )
+    return parts.summary_section(paragraphs, shown)
 
 
 def _found(recovery: xr.Dataset) -> list[str]:
@@ -143,9 +128,9 @@ def _found(recovery: xr.Dataset) -> list[str]:
 
 def errors_section(recovery: xr.Dataset) -> Section:
     """Return the table of errors and coverage."""
-    table = answer_table(recovery_answer(recovery))
+    table = parts.answer_table(recovery_answer(recovery))
     note = "Errors are relative to the truth."
-    return section_of_table("errors", "Errors and intervals", table, note)
+    return parts.section_of_table("errors", "Errors and intervals", table, note)
 
 
 def by_length_section(recovery: xr.Dataset) -> Section:
@@ -155,13 +140,13 @@ def by_length_section(recovery: xr.Dataset) -> Section:
     drawn = []
     for angle in recovery["angle"].values:
         rms = recovery["rms_error"].sel(parameter="drag_coefficient", angle=angle).values
-        drawn.append(series(f"angle {angle}", length, rms, style="points"))
+        drawn.append(parts.series(f"angle {angle}", length, rms, style="points"))
     wanted = value_of(recovery, "drag_coefficient_precision")
-    marks = [] if wanted is None else [mark("wanted", y=wanted)]
-    return chart(
+    marks = [] if wanted is None else [parts.mark("wanted", y=wanted)]
+    return parts.chart(
         "by-length", "Error by length", "Root mean square of ln(estimate / truth).",
-        x=label("length of a recording", "s", log=True), y=label("error of C_d", log=True),
-        series=drawn, marks=marks,
+        x=parts.label("length of a recording", "s", log=True),
+        y=parts.label("error of C_d", log=True), series=drawn, marks=marks,
     )  # fmt: skip
 
 
@@ -179,7 +164,7 @@ def estimates_section(recovery: xr.Dataset, *, name: str) -> Section:
         ]
     return _estimates_chart(
         _id_of(name), f"Estimates: {parameter.words}",
-        label(parameter.words, parameter.unit), required(recovery, parameter.key), drawn,
+        parts.label(parameter.words, parameter.unit), required(recovery, parameter.key), drawn,
     )  # fmt: skip
 
 
@@ -191,10 +176,10 @@ def _estimates_chart(
     for words, at, kept, values in drawn:
         if kept.any():
             value, low, high = (np.where(kept, one, np.nan) for one in values)
-            shown.append(series(words, at, value, ends=(low, high), style="points"))
-    return chart(
-        id, title, "Each point is a recording, with its interval.", x=label("recording"), y=y,
-        series=shown, marks=[mark("truth", y=truth)],
+            shown.append(parts.series(words, at, value, ends=(low, high), style="points"))
+    return parts.chart(
+        id, title, "Each point is a recording, with its interval.", x=parts.label("recording"), y=y,
+        series=shown, marks=[parts.mark("truth", y=truth)],
     )  # fmt: skip
 
 
@@ -204,10 +189,10 @@ def flow_error_section(recovery: xr.Dataset) -> Section:
     drawn = []
     for at, words, part in _groups(recovery):
         error = np.where(part["used"].values == 1, part["flow_error"].values, np.nan)
-        drawn.append(series(words, at, error, style="points"))
-    return chart(
+        drawn.append(parts.series(words, at, error, style="points"))
+    return parts.chart(
         "flow-error", "Error of the flow", "Rms error over rms speed, averaged over the block.",
-        x=label("recording"), y=label("relative error"), series=drawn,
+        x=parts.label("recording"), y=parts.label("relative error"), series=drawn,
     )  # fmt: skip
 
 
@@ -245,7 +230,7 @@ def model_recovery_sections(model_recovery: xr.Dataset | None) -> list[Section]:
     reason = _obstacle(model_recovery, MOST_PARAMETERS, "parameter")
     found = None if reason else model_recovery
     names = [] if found is None else list(map(str, found["parameter"].values))
-    parts: tuple[tuple[str, str, Maker], ...] = (
+    pieces: tuple[tuple[str, str, Maker], ...] = (
         ("errors", "Errors and intervals", model_errors_section),
         *(
             (
@@ -256,7 +241,7 @@ def model_recovery_sections(model_recovery: xr.Dataset | None) -> list[Section]:
             for at, name in enumerate(names, start=1)
         ),
     )
-    return sections_of(found, reason, model_summary_section, model_warnings, parts)
+    return parts.sections_of(found, reason, model_summary_section, model_warnings, pieces)
 
 
 def model_summary_section(recovery: xr.Dataset) -> Section:
@@ -273,19 +258,19 @@ def model_summary_section(recovery: xr.Dataset) -> Section:
         if chosen.size:
             paragraphs.append(f"{words} recording determines {', '.join(chosen)}.")
     shown = [
-        figure("length of a recording", length, "s"),
-        figure("samples per second", required(recovery, "sample_rate_Hz"), "Hz"),
-        figure("position noise", required(recovery, "position_noise_m"), "m"),
+        parts.figure("length of a recording", length, "s"),
+        parts.figure("samples per second", required(recovery, "sample_rate_Hz"), "Hz"),
+        parts.figure("position noise", required(recovery, "position_noise_m"), "m"),
     ]
-    return summary_section(paragraphs, shown)
+    return parts.summary_section(paragraphs, shown)
 
 
 def model_errors_section(recovery: xr.Dataset) -> Section:
     """Return the table of errors, of what is determined, and of coverage."""
     require(recovery, "meaning")
-    table = answer_table(model_recovery_answer(recovery))
+    table = parts.answer_table(model_recovery_answer(recovery))
     meanings = map(str, recovery["meaning"].values)
-    return table_section(
+    return parts.table_section(
         "errors", "Errors and intervals", [*table.columns, "meaning"],
         [[*row, words] for row, words in zip(table.rows, meanings, strict=True)],
         "Errors are relative to the truth. A parameter is determined where its 90 % interval ends "
@@ -302,6 +287,6 @@ def model_estimates_section(recovery: xr.Dataset, *, index: int) -> Section:
     known, name = one["determined"].values.astype(bool), str(one["parameter"].values)
     return _estimates_chart(
         f"estimates-{index + 1}", f"Estimates: {name}",
-        label(name.replace("_", " "), str(one["unit"].values)), float(one["truth"]),
+        parts.label(name.replace("_", " "), str(one["unit"].values)), float(one["truth"]),
         [("determined", at, known, values), ("not determined", at, ~known, values)],
     )  # fmt: skip

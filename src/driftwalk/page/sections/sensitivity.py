@@ -7,22 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from driftwalk.page import parts
 from driftwalk.page.arrays import number, numbers
-from driftwalk.page.parts import (
-    Section,
-    attempt,
-    count,
-    empty_section,
-    figure,
-    quantity,
-    require,
-    section,
-    sections_of,
-    settings_of,
-    summary_section,
-    table_section,
-    value_of,
-)
+from driftwalk.page.parts import Section, count, quantity, require, value_of
 from driftwalk.page.sections.outcomes import cells_of, classes_section
 from driftwalk.page.sections.sensitivity_maps import (
     l1_sections,
@@ -74,7 +61,7 @@ def sensitivity_sections(
     >>> [part["kind"] for part in sensitivity_sections()]
     ['empty']
     """
-    made = sections_of(
+    made = parts.sections_of(
         sensitivity,
         "There is no map of settings yet.",
         lambda found: sensitivity_summary(found, reference),
@@ -87,18 +74,18 @@ def sensitivity_sections(
     )
     if reference is not None:
         id, title = "reference", "The reference"
-        made += attempt(
+        made += parts.attempt(
             id, title, lambda: classes_section({"reference": reference}, id=id, title=title)
         )
     if components is not None and sensitivity is not None:
-        made += attempt(
+        made += parts.attempt(
             "biplot", "Principal components", lambda: biplot_section(components, sensitivity)
         )
     elif sensitivity is not None:
         reason = "They need two settings with different outcomes."
-        made.append(empty_section("biplot", "Principal components", reason))
+        made.append(parts.empty_section("biplot", "Principal components", reason))
     if sobol is not None:
-        made += attempt("sobol", "Sobol' indices", lambda: sobol_section(sobol))
+        made += parts.attempt("sobol", "Sobol' indices", lambda: sobol_section(sobol))
     return made
 
 
@@ -133,11 +120,11 @@ def sensitivity_summary(sensitivity: xr.Dataset, reference: xr.Dataset | None) -
             )
         paragraphs.append(told)
     shown = [
-        figure("smallest l1 distance", known.min() if known.size else None),
-        figure("largest l1 distance", known.max() if known.size else None),
-        figure("by chance, 95 %", floor, note="distance of the reference to itself"),
+        parts.figure("smallest l1 distance", known.min() if known.size else None),
+        parts.figure("largest l1 distance", known.max() if known.size else None),
+        parts.figure("by chance, 95 %", floor, note="distance of the reference to itself"),
     ]
-    return summary_section(paragraphs, shown)
+    return parts.summary_section(paragraphs, shown)
 
 
 def _warnings(sensitivity: xr.Dataset) -> list[str]:
@@ -165,13 +152,13 @@ def biplot_section(components: xr.Dataset, sensitivity: xr.Dataset) -> Section:
         for name in ("complete", "l1_distance")
         if name in sensitivity and set(map(str, sensitivity[name].dims)) == set(dims)
     }
-    settings = settings_of(
+    settings = parts.settings_of(
         *(
             [f"{axis_number(n).plain} {value_words(n, v)}" for v in sensitivity[n].values]
             for n in dims
         )
     )
-    return section(
+    return parts.section(
         "biplot", "biplot", "Principal components",
         "Points are settings, arrows the loadings of the classes, "
         f"{found.factor:.3g} times as long.",
@@ -211,7 +198,7 @@ def sobol_section(sobol: xr.Dataset) -> Section:
         ]
         for output, (k, words) in product(sorted(map(int, order)), enumerate(inputs))
     ]
-    return table_section(
+    return parts.table_section(
         "sobol", "Sobol' indices",
         ["output", "input", "first order", "± half width", "total", "± half width"], rows,
         "Share of an output's variance that an input explains alone (first order), "

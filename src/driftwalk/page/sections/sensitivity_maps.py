@@ -9,20 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
+from driftwalk.page import parts
 from driftwalk.page.arrays import encode_array, numbers
-from driftwalk.page.parts import (
-    Section,
-    axis,
-    chart,
-    label,
-    mark,
-    quantity,
-    require,
-    section,
-    series,
-    settings_of,
-    value_of,
-)
+from driftwalk.page.parts import Section, quantity, require, value_of
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
 from driftwalk.plot.parts.polyomino_sketch import are_discs
@@ -73,7 +62,7 @@ def axis_of(part: xr.Dataset, name: str) -> dict[str, Any]:
     every = value_of(part, "force_interval_s")
     if name == "force_std" and every is not None:
         words += f", redrawn every {quantity(every, 's')}"
-    return axis(name, words, number.unit, part[name].values)
+    return parts.axis(name, words, number.unit, part[name].values)
 
 
 def value_words(name: str, value: Any) -> str:
@@ -118,10 +107,10 @@ def l1_sections(sensitivity: xr.Dataset) -> list[Section]:
 def times_sections(sensitivity: xr.Dataset) -> list[Section]:
     """Return the classes over time of the settings of a study that is no map, one to be chosen."""
     require_axes(sensitivity)
-    parts = _slices(with_fewer_times(sensitivity))[:MOST_SLICES]
+    pieces = _slices(with_fewer_times(sensitivity))[:MOST_SLICES]
     return [
         setting_times_section(part, "times" if place == 0 else f"times-{place + 1}", words)
-        for place, (words, part) in enumerate(parts)
+        for place, (words, part) in enumerate(pieces)
         if not _is_map(part)
     ]
 
@@ -146,7 +135,7 @@ def setting_sections(sensitivity: xr.Dataset) -> list[Section]:
             made.append(_lines(sensitivity, name, id, title, words, unit=unit))
             continue
         made.append(
-            section(
+            parts.section(
                 id, "image_grid", title, None if unit == "1" else NOT_REACHED,
                 arena=None, x=axis_of(sensitivity, x), y=axis_of(sensitivity, y),
                 value=encode_array(sensitivity[name].transpose(y, x).values),
@@ -175,7 +164,7 @@ def _l1_map(part: xr.Dataset, x: str, y: str, id: str, title: str) -> Section:
     if floor is not None:
         note += f" Chance alone gives up to {floor:.3g} (95 %)."
     at = [_reference(part, name) for name in (x, y)]
-    return section(
+    return parts.section(
         id, "l1_map", title, note,
         x=axis_of(part, x), y=axis_of(part, y),
         value=encode_array(part["l1_distance"].transpose(y, x).values),
@@ -206,12 +195,12 @@ def _lines(
     positions, note = _positions(part, x)
     drawn: list[dict[str, Any]] = []
     if y is None:
-        drawn.append(series(words, positions, part[variable].values, style="points"))
+        drawn.append(parts.series(words, positions, part[variable].values, style="points"))
     else:
         for value in part[y].values:
             one = part[variable].sel({y: value}).values
             drawn.append(
-                series(
+                parts.series(
                     f"{axis_number(y).plain} {value_words(y, value)}",
                     positions,
                     one,
@@ -221,10 +210,11 @@ def _lines(
     marks = []
     floor = value_of(part, "noise_floor_95")
     if noise and floor is not None:
-        marks.append(mark("by chance, 95 %", y=floor))
+        marks.append(parts.mark("by chance, 95 %", y=floor))
     across = axis_number(x)
-    return chart(
-        id, title, note or None, x=label(across.words, across.unit), y=label(words, unit),
+    return parts.chart(
+        id, title, note or None,
+        x=parts.label(across.words, across.unit), y=parts.label(words, unit),
         series=drawn, marks=marks,
     )  # fmt: skip
 
@@ -242,12 +232,12 @@ def _slices(sensitivity: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     """Return the parts of a study that have at most two axes, and what they are."""
     dims = [str(dim) for dim in sensitivity["l1_distance"].dims]
     fixed = dims[: max(len(dims) - MAP_AXES, 0)]
-    parts = []
-    for values in settings_of(*(sensitivity[name].values.tolist() for name in fixed)):
+    pieces = []
+    for values in parts.settings_of(*(sensitivity[name].values.tolist() for name in fixed)):
         chosen = dict(zip(fixed, values, strict=True))
         words = "".join(f", {axis_number(n).plain} {value_words(n, v)}" for n, v in chosen.items())
-        parts.append((words, sensitivity.sel(chosen)))
-    return parts
+        pieces.append((words, sensitivity.sel(chosen)))
+    return pieces
 
 
 def _reference(part: xr.Dataset, name: str) -> float | None:
@@ -308,9 +298,9 @@ def setting_times_section(part: xr.Dataset, id: str, where: str) -> Section:
         ", ".join(
             f"{axis_number(n).plain} {value_words(n, v)}" for n, v in zip(dims, place, strict=True)
         )
-        for place in settings_of(*(part[name].values.tolist() for name in dims))
+        for place in parts.settings_of(*(part[name].values.tolist() for name in dims))
     ]
-    return section(id, "setting_times", title, None, settings=settings, over_time=found)
+    return parts.section(id, "setting_times", title, None, settings=settings, over_time=found)
 
 
 def with_fewer_times(sensitivity: xr.Dataset) -> xr.Dataset:

@@ -7,20 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.core.units import in_percent, percent
-from driftwalk.page.parts import (
-    Maker,
-    Section,
-    chart,
-    figure,
-    label,
-    mark,
-    require,
-    required,
-    sections_of,
-    series,
-    summary_section,
-    table_part,
-)
+from driftwalk.page import parts
+from driftwalk.page.parts import Maker, Section, require, required
 from driftwalk.schema.answers.yields import (
     front_table,
     setting_table,
@@ -58,13 +46,13 @@ def yield_sections(*, yields: xr.Dataset | None = None) -> list[Section]:
     >>> [part["kind"] for part in yield_sections()]
     ['empty']
     """
-    parts: list[tuple[str, str, Maker]] = [
+    pieces: list[tuple[str, str, Maker]] = [
         ("front", "Front of yield and time", front_section),
-        table_part("settings", "Settings", setting_table),
+        parts.table_part("settings", "Settings", setting_table),
         ("along", "Along each setting", along_sections),
-        table_part("times", BY_TIME, front_table),
+        parts.table_part("times", BY_TIME, front_table),
     ]
-    return sections_of(yields, "There is no yield yet.", yield_summary, _warnings, parts)
+    return parts.sections_of(yields, "There is no yield yet.", yield_summary, _warnings, pieces)
 
 
 def yield_summary(yields: xr.Dataset) -> Section:
@@ -82,12 +70,12 @@ def yield_summary(yields: xr.Dataset) -> Section:
         *(f"{text[:1].upper()}{text[1:]}.".replace("`", "") for text in standing_sentences(yields)),
     ]
     shown = [
-        figure(
+        parts.figure(
             f"yield of {target} by {facts['by_s']:g} s", float(best["fresh_yield"]),
             note=f"{percent(low)} to {percent(high)}, {in_percent(facts['confidence'])} interval",
         )
     ]  # fmt: skip
-    return summary_section(paragraphs, shown)
+    return parts.summary_section(paragraphs, shown)
 
 
 def front_section(yields: xr.Dataset) -> Section:
@@ -95,18 +83,20 @@ def front_section(yields: xr.Dataset) -> Section:
     require(yields, "time", "share", "front_yield", "front_yield_low", "front_yield_high")
     time = yields["time"].values
     ends = (yields["front_yield_low"].values, yields["front_yield_high"].values)
-    drawn = [series("best setting of each time", time, yields["front_yield"].values, ends=ends)]
+    drawn = [
+        parts.series("best setting of each time", time, yields["front_yield"].values, ends=ends)
+    ]
     fresh = np.flatnonzero(yields["fresh_runs"].values > 0)
     order = fresh[np.argsort(-yields["fresh_yield"].values[fresh], kind="stable")]
     drawn += [
-        series(setting_words(yields, int(at)), time, yields["share"].values[at])
+        parts.series(setting_words(yields, int(at)), time, yields["share"].values[at])
         for at in order[:MOST_CURVES]
     ]
-    return chart(
+    return parts.chart(
         "front", "Front of yield and time",
         "From fresh runs; for each time the setting was chosen by the runs before them.",
-        x=label("time", "s"), y=label("share of runs with the target"), series=drawn,
-        marks=[mark(f"deadline {yields.attrs['by_s']:g} s", x=yields.attrs["by_s"])],
+        x=parts.label("time", "s"), y=parts.label("share of runs with the target"), series=drawn,
+        marks=[parts.mark(f"deadline {yields.attrs['by_s']:g} s", x=yields.attrs["by_s"])],
     )  # fmt: skip
 
 
@@ -124,12 +114,12 @@ def along_sections(yields: xr.Dataset) -> list[Section]:
             mine = yields["standing"].values == word
             if mine.any():
                 text = "cannot be distinguished" if word == "alike" else word
-                drawn.append(series(text, values[mine], share[mine], style="points"))
+                drawn.append(parts.series(text, values[mine], share[mine], style="points"))
         number = axis_number(name)
         found.append(
-            chart(
+            parts.chart(
                 f"along-{name}", f"Yield along {number.plain}", "In the choosing runs.",
-                x=label(number.words, number.unit), y=label("yield"), series=drawn,
+                x=parts.label(number.words, number.unit), y=parts.label("yield"), series=drawn,
             )
         )  # fmt: skip
     return found
