@@ -10,7 +10,6 @@ from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, wit
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import FlowFile, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.output import print_result
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
@@ -55,5 +54,4 @@ def calibrate(
     models = ["block" if chosen is None else chosen]
     read, begun = read_for_models(recording, flow, given, how, models)
     work = CalibrationWork(**read, threads=options.threads, model=chosen, posterior=posterior)
-    found = options.run(work, "calibrate", begun=begun)
-    print_result(found, options.out, json=options.json)
+    options.answer(work, "calibrate", begun=begun)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -73,7 +72,9 @@ def demo(
         work = FitWork([recording], study, None, inputs, fitted=tell)
         if not _run(work, fit, overwrite=overwrite):
             tell(open_netcdf(fit / "fit.nc"))
-        fitted = Fitted(open_netcdf(fit / "fit.nc"), open_netcdf(fit / "check.nc"), recording)
+        stored = open_netcdf(fit / "fit.nc")
+        fitted = fit_json(stored, open_netcdf(fit / "check.nc"))
+        fitted |= {"flow_error": _flow_error(stored, recording)}
         _write_page(out, FIT)
         if not json:
             print_check(fitted)
@@ -85,7 +86,8 @@ def demo(
     calibration = open_netcdf(out / CALIBRATION / "calibration.nc")
     _write_page(out, FIT, CALIBRATION)
     if json:
-        print_json(in_json(fitted, calibration))
+        search = calibration_answer(calibration).facts
+        print_json({"truth": demo_truth(), "fit": fitted, "calibration": search})
     else:
         print_calibration(calibration)
         _print_places(out, out / PAGE)
@@ -155,40 +157,21 @@ TRUTH: Final = {
 """Keys of the truth that estimates are compared with: of the drag, the one that acts."""
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """Results of the first half of the demo.
+def _flow_error(fit: xr.Dataset, recording: xr.Dataset) -> float:
+    """Return the relative error of the fitted flow, averaged over the block; see `score_fit`."""
+    from driftwalk.datasets import tank30_flow
+    from driftwalk.likelihood import score_fit
 
-    Attributes
-    ----------
-    fit : xarray.Dataset
-        A `fit`.
-    check : xarray.Dataset
-        Its `model_check`.
-    recording : xarray.Dataset
-        The `trajectory`.
-    """
-
-    fit: xr.Dataset
-    check: xr.Dataset
-    recording: xr.Dataset
-
-    @property
-    def flow_error(self) -> float:
-        """Relative error of the fitted flow, averaged over the block; see `score_fit`."""
-        from driftwalk.datasets import tank30_flow
-        from driftwalk.likelihood import score_fit
-
-        truth = demo_truth()
-        score = score_fit(
-            self.fit,
-            drag_coefficient=truth["drag_coefficient"],
-            force_std=truth["force_std_N"],
-            tracking_noise=truth["tracking_noise_m"],
-            flow=tank30_flow(),
-            recordings=self.recording,
-        )
-        return float(score["flow_error"])
+    truth = demo_truth()
+    score = score_fit(
+        fit,
+        drag_coefficient=truth["drag_coefficient"],
+        force_std=truth["force_std_N"],
+        tracking_noise=truth["tracking_noise_m"],
+        flow=tank30_flow(),
+        recordings=recording,
+    )
+    return float(score["flow_error"])
 
 
 def demo_truth() -> dict[str, float]:
@@ -197,15 +180,6 @@ def demo_truth() -> dict[str, float]:
 
     truth = tank30_truth()
     return {name: truth[key] for name, key in TRUTH.items()}
-
-
-def in_json(fitted: Fitted, calibration: xr.Dataset) -> dict[str, Any]:
-    """Return what ``--json`` prints: the two answers and the truth."""
-    return {
-        "truth": demo_truth(),
-        "fit": fit_json(fitted.fit, fitted.check) | {"flow_error": fitted.flow_error},
-        "calibration": calibration_answer(calibration).facts,
-    }
 
 
 def print_fit(fit: xr.Dataset) -> None:
@@ -225,10 +199,9 @@ def print_fit(fit: xr.Dataset) -> None:
     )
 
 
-def print_check(fitted: Fitted) -> None:
+def print_check(fit: dict[str, Any]) -> None:
     """Print how far the flow is off, the verdict on the model, and what warns."""
-    fit = fit_json(fitted.fit, fitted.check)
-    _print_row("flow past the block", "", f"{in_percent(fitted.flow_error, decimals=1)} off")
+    _print_row("flow past the block", "", f"{in_percent(fit['flow_error'], decimals=1)} off")
     _print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
     _print_verdict(fit)
     for warning in fit["warnings"]:

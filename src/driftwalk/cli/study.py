@@ -36,7 +36,6 @@ from driftwalk.cli.terminal.output import (
     print_json,
     print_next,
     print_note,
-    print_result,
     print_warnings,
     require_place,
 )
@@ -191,8 +190,7 @@ def recover(
             if value:
                 raise ConfigurationError(f"{name} belongs to a --model; the block has --study FILE")
         method, inputs = _of_block(source)
-    found = options.run(RecoveryWork(method, inputs, threads), "recover")
-    print_result(found, options.out, json=options.json)
+    options.answer(RecoveryWork(method, inputs, threads), "recover")
 
 
 def _of_model(

@@ -112,8 +112,7 @@ def plan(
     wanted = Wanted(target, by, every, latency, missed, dwell)
     work = ControlPlanWork(modes, wanted, rounds, worlds, seed, inputs)
     said = dict.fromkeys(text for _, warnings in taken for text in warnings)
-    found: xr.Dataset = options.run(work, "control plan", warnings=[*said])
-    print_result(found, options.out, json=options.json)
+    options.answer(work, "control plan", warnings=[*said])
 
 
 @control_app.command("test", cls=HelpCommand)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from driftwalk.cli.assembly.kinetics import files_of, opened_histories
 from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source
@@ -11,13 +11,9 @@ from driftwalk.cli.inputs.varied import parted_numbers, read_varied
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.output import print_result
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS, INFERRED_KEYS, INFERRED_RANGES
 from driftwalk.model import declared
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 NAMES = tuple(name for name in RUN_NAMES if name not in ("duration", "seed", "confidence"))
 """Options for the study: the duration is that of the data, the others have no effect here."""
@@ -86,8 +82,7 @@ def infer_outcomes(
     work = OutcomePosteriorWork(
         outcomes, model.flow, model.study, chosen, {**model.inputs, **inputs}, options.threads
     )
-    found: xr.Dataset = options.run(work, "infer-outcomes", warnings=model.warnings)
-    print_result(found, options.out, json=options.json)
+    options.answer(work, "infer-outcomes", warnings=model.warnings)
 
 
 def _outcomes(source: Path) -> tuple[Any, dict[str, Path]]:

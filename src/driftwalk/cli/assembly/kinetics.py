@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import PANEL, argument, option
-from driftwalk.cli.terminal.output import print_result
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,8 +59,7 @@ def kinetics(
             for number, path in enumerate(paths, start=1)
         },
     )
-    found: xr.Dataset = options.run(work, "kinetics")
-    print_result(found, options.out, json=options.json)
+    options.answer(work, "kinetics")
 
 
 def files_of(source: Path) -> list[Path]:

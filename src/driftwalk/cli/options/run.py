@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from driftwalk.cli.options.flatten_options import option_field, with_options
 from driftwalk.cli.options.shared_types import Json, Overwrite, Threads, option
-from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.output import print_note, print_result
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import ConfigurationError
 
@@ -40,6 +40,10 @@ class RunOptions:
 
         with self.reported(title) as told:
             return run_work(work, self.out, overwrite=self.overwrite, **how, **told)
+
+    def answer(self, work: Any, title: str, **how: Any) -> None:
+        """Run a piece of work whose result is one dataset, and print its answer."""
+        print_result(self.run(work, title, **how), self.out, json=self.json)
 
     @contextmanager
     def reported(self, title: str) -> Iterator[dict[str, Any]]:
