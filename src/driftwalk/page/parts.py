@@ -220,9 +220,11 @@ def section_of_table(id: str, title: str, table: Table, note: str = "") -> Secti
     return table_section(id, title, table.columns, table.rows, note)
 
 
-def table_part(id: str, title: str, table_of: Callable[[Any], Table]) -> tuple[str, str, Maker]:
+def table_part(
+    id: str, title: str, table_of: Callable[[Any], Table], note: str = ""
+) -> tuple[str, str, Maker]:
     """Return a part of a page that is one table of an answer, for `sections_of`."""
-    return id, title, lambda found: section_of_table(id, title, table_of(found))
+    return id, title, lambda found: section_of_table(id, title, table_of(found), note)
 
 
 def answer_table(answer: Answer) -> Table:

@@ -9,7 +9,7 @@ from driftwalk.plot.assembly_courses import (
 )
 from driftwalk.plot.components import plot_biplot as biplot
 from driftwalk.plot.distances import plot_ks_map as map, plot_refined_map as refined_map
-from driftwalk.plot.film import write_animation
+from driftwalk.plot.film import require_film_writer, write_animation
 from driftwalk.plot.flow_field import plot_flow as flow
 from driftwalk.plot.model_check import (
     plot_innovations as innovations,
@@ -18,7 +18,6 @@ from driftwalk.plot.model_check import (
     plot_residual_time as residual_time,
 )
 from driftwalk.plot.outcome_bars import plot_outcomes as outcomes
-from driftwalk.plot.parts.film_file import require_film_writer
 from driftwalk.plot.sensitivity_maps import (
     plot_class_key as class_key,
     plot_class_panels as class_panels,

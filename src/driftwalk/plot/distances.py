@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -85,7 +85,7 @@ def plot_ks_map(
     )
     mesh.set_rasterized(True)
     _hatch_causes(ax, edges, status, np.isfinite(score))
-    _draw_region(ax, calibration)
+    draw_region(ax, calibration, lw=0.9, zorder=5, path_effects=style.outlined(2.0))
     draw_optimum(ax, calibration)
     _finish(ax, calibration, mesh, colorbar)
     return ax
@@ -155,7 +155,7 @@ def plot_refined_map(
             *_finely(at_x, at_y, surface), levels=levels[(low < levels) & (levels < high)],
             colors="white", linewidths=0.6,
         )  # fmt: skip
-    _draw_region(ax, calibration)
+    draw_region(ax, calibration, lw=0.9, zorder=5, path_effects=style.outlined(2.0))
     draw_optimum(ax, calibration)
     ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
     bar = _finish(ax, calibration, mesh, colorbar)
@@ -228,19 +228,18 @@ def draw_optimum(ax: Axes, calibration: xr.Dataset, *, color: str = "white") -> 
     )  # fmt: skip
 
 
-def _draw_region(ax: Axes, calibration: xr.Dataset) -> None:
-    """Outline the 90 % region of the estimate."""
+def draw_region(ax: Axes, calibration: xr.Dataset, **look: Any) -> None:
+    """Outline the 90 % region of the estimate, where there is one."""
     from matplotlib.patches import Polygon
 
     outline = region_of(calibration)
-    if outline is None:
-        return
-    ax.add_patch(
-        Polygon(
-            outline, closed=True, facecolor="none", edgecolor=style.INK, linewidth=0.9, zorder=5,
-            label=REGION_LABEL, path_effects=style.outlined(2.0),
-        )
-    )  # fmt: skip
+    if outline is not None:
+        ax.add_patch(
+            Polygon(
+                outline, closed=True, facecolor="none", edgecolor=style.INK, label=REGION_LABEL,
+                **look,
+            )
+        )  # fmt: skip
 
 
 def region_of(calibration: xr.Dataset) -> Floats | None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.plot.distances import REGION_LABEL, draw_optimum, region_of
+from driftwalk.plot.distances import draw_optimum, draw_region
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.labels import (
     PlotParameter,
@@ -181,25 +181,12 @@ def plot_bootstrap(calibration: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 def _cloud(calibration: xr.Dataset, ax: Axes) -> None:
-    from matplotlib.patches import Polygon
-
     across, up = plane_of(calibration)
     ax.plot(
         across.values(calibration, "bootstrap_"), up.values(calibration, "bootstrap_"), "o",
         ms=2.6, mew=0.0, color=style.BLUE, alpha=0.45, label=ESTIMATES_LABEL,
     )  # fmt: skip
-    region = region_of(calibration)
-    if region is not None:
-        ax.add_patch(
-            Polygon(
-                region,
-                closed=True,
-                facecolor="none",
-                edgecolor=style.INK,
-                lw=0.8,
-                label=REGION_LABEL,
-            )
-        )
+    draw_region(ax, calibration, lw=0.8)
     draw_optimum(ax, calibration, color=style.ORANGE)
     ax.autoscale_view()
     across.scale(ax, "x")

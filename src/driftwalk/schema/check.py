@@ -101,18 +101,8 @@ def check_dataset(dataset: xr.Dataset, kind: str | None = None) -> xr.Dataset:
     if "schema_version" not in dataset.attrs:
         raise InputError(f"not of the kind {found.name}: the attribute 'schema_version' is missing")
     refuse_other_version(dataset)
-    for variable in found.variables:
-        if variable.name in dataset.variables:
-            _check_variable(dataset, variable, found)
-        elif not variable.when:
-            raise InputError(
-                f"not of the kind {found.name}: the variable '{variable.name}' is missing"
-            )
-    for attribute in found.attributes:
-        if not attribute.when and attribute.name not in dataset.attrs:
-            raise InputError(
-                f"not of the kind {found.name}: the attribute '{attribute.name}' is missing"
-            )
+    for fault in _differences(dataset, found):
+        raise InputError(f"not of the kind {found.name}: {fault}")
     return dataset
 
 
@@ -209,26 +199,28 @@ def unknown_names(dataset: xr.Dataset) -> list[str]:
     ]
 
 
-def _check_variable(dataset: xr.Dataset, variable: Variable, kind: Kind) -> None:
-    held = dataset.variables[variable.name]
-    dims = tuple(str(dim) for dim in held.dims)
+def _differences(dataset: xr.Dataset, kind: Kind) -> Iterator[str]:
+    """Yield what is missing, or is not what the schema says."""
+    for variable in kind.variables:
+        if variable.name in dataset.variables:
+            yield from _variable_differences(dataset.variables[variable.name], variable)
+        elif not variable.when:
+            yield f"the variable '{variable.name}' is missing"
+    for attribute in kind.attributes:
+        if not attribute.when and attribute.name not in dataset.attrs:
+            yield f"the attribute '{attribute.name}' is missing"
+
+
+def _variable_differences(held: xr.Variable, variable: Variable) -> Iterator[str]:
+    name, dims = f"'{variable.name}'", tuple(str(dim) for dim in held.dims)
     if not variable.lies_on(dims):
-        raise InputError(
-            f"not of the kind {kind.name}: '{variable.name}' lies on ({', '.join(dims)}), expected "
-            f"({', '.join(variable.dims.split())})"
-        )
-    letter = held.dtype.kind
-    if letter not in LETTERS[variable.holds]:
-        raise InputError(
-            f"not of the kind {kind.name}: '{variable.name}' holds {held.dtype}, expected "
-            f"{WORDS[variable.holds]}"
-        )
+        expected = ", ".join(variable.dims.split())
+        yield f"{name} lies on ({', '.join(dims)}), expected ({expected})"
+    if held.dtype.kind not in LETTERS[variable.holds]:
+        yield f"{name} holds {held.dtype}, expected {WORDS[variable.holds]}"
     units = held.attrs.get("units")
     if units != variable.units:
-        raise InputError(
-            f"not of the kind {kind.name}: '{variable.name}' has the units {units!r}, expected "
-            f"{variable.units!r}"
-        )
+        yield f"{name} has the units {units!r}, expected {variable.units!r}"
 
 
 def check_contents(dataset: xr.Dataset, path: Path) -> xr.Dataset:

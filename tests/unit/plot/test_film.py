@@ -14,8 +14,7 @@ from synthetic_assembly import ARENA, assembly_end, assembly_path
 
 from driftwalk.core.errors import InputError
 from driftwalk.plot import film, write_animation
-from driftwalk.plot.parts import film_file
-from driftwalk.plot.parts.film_file import FRAMES_PER_S
+from driftwalk.plot.film import FRAMES_PER_S
 from driftwalk.plot.parts.style import PALETTE
 from driftwalk.schema import build_trajectory
 
@@ -167,7 +166,7 @@ def test_a_film_is_whole_or_not_there(path, tmp_path, monkeypatch) -> None:
 @pytest.mark.slow
 def test_opencv_writes_an_mp4_where_there_is_no_ffmpeg(tmp_path, monkeypatch) -> None:
     cv2 = pytest.importorskip("cv2", reason="OpenCV is not installed: pip install driftwalk[track]")
-    monkeypatch.setattr(film_file.shutil, "which", lambda _name: None)
+    monkeypatch.setattr(film.shutil, "which", lambda _name: None)
     file = write_animation(two_bodies(), tmp_path / "a.mp4", speed=4.0)
     video = cv2.VideoCapture(str(file))
     assert video.get(cv2.CAP_PROP_FPS) == 25.0

@@ -47,16 +47,18 @@ def check_sections(check: xr.Dataset) -> list[Section]:
     check : xarray.Dataset
         A `model_check`.
     """
+    lengths = partial(_density, name="step_length", unit="m")
+    angles = partial(_density, name="turning_angle", unit="rad")
     makers: tuple[tuple[str, str, Maker], ...] = (
         ("check", "Does the model explain the recording?", _criteria),
         ("check-innovations", "Are the errors of prediction white?", _innovations),
         ("check-place", "Errors of prediction in the tank", _mean_errors),
         ("check-noise", "Size of the errors in the tank", _noise_ratio),
-        ("check-flow-time", "Strength of the flow over time", _flow_over_time),
-        ("check-noise-time", "Size of the errors over time", _noise_over_time),
+        ("check-flow-time", "Strength of the flow over time", partial(_over_time, show="flow")),
+        ("check-noise-time", "Size of the errors over time", partial(_over_time, show="noise")),
         ("check-drag-speed", "Drag at different speeds", _drag_by_speed),
-        ("check-step-length", "Step lengths, recorded and predicted", _step_lengths),
-        ("check-turning-angle", "Turning angles, recorded and predicted", _turning_angles),
+        ("check-step-length", "Step lengths, recorded and predicted", lengths),
+        ("check-turning-angle", "Turning angles, recorded and predicted", angles),
     )
     made: list[Section] = []
     for id, title, make in makers:
@@ -149,25 +151,19 @@ def _field(
     )  # fmt: skip
 
 
-def _flow_over_time(check: xr.Dataset) -> Section:
-    words = "strength of the flow, relative to its mean"
-    return _over_time(check, "flow_change", 0.0, words, ABSORBED)
-
-
-def _noise_over_time(check: xr.Dataset) -> Section:
-    return _over_time(check, "part_noise_ratio", 1.0, "squared errors, relative to their mean")
-
-
-def _over_time(
-    check: xr.Dataset, name: str, shift: float, words: str, absorbed: str = ""
-) -> Section:
+def _over_time(check: xr.Dataset, *, show: str) -> Section:
+    name, shift, words = (
+        ("flow_change", 0.0, "strength of the flow, relative to its mean")
+        if show == "flow"
+        else ("part_noise_ratio", 1.0, "squared errors, relative to their mean")
+    )
     require(check, name, f"{name}_std", "part_start", "part_end", "part_recording")
     start, end = running_time(check)
     value = check[name].values - shift
     reach = BAND_STDS * check[f"{name}_std"].values
     note = "Tenths of the recording, with 95 % bars; 0 if nothing changes."
-    if absorbed and np.isnan(value).any():
-        note += f" {absorbed}"
+    if show == "flow" and np.isnan(value).any():
+        note += f" {ABSORBED}"
     return parts.chart(
         "", "", note,
         x=parts.label("time", "s"), y=parts.label(words),
@@ -194,15 +190,7 @@ def _drag_by_speed(check: xr.Dataset) -> Section:
     )  # fmt: skip
 
 
-def _step_lengths(check: xr.Dataset) -> Section:
-    return _density(check, "step_length", parts.label("step length", "m"), "1/m")
-
-
-def _turning_angles(check: xr.Dataset) -> Section:
-    return _density(check, "turning_angle", parts.label("turning angle", "rad"), "1/rad")
-
-
-def _density(check: xr.Dataset, name: str, along: dict[str, Any], unit: str) -> Section:
+def _density(check: xr.Dataset, *, name: str, unit: str) -> Section:
     if f"{name}_edge" not in check:
         reason = f"No recordings were simulated: {check.attrs.get('ks_left_out', 'left out')}."
         return parts.empty_section("", "", reason)
@@ -213,7 +201,8 @@ def _density(check: xr.Dataset, name: str, along: dict[str, Any], unit: str) -> 
     band = value_of(check, "band")
     share = "" if band is None else f" and band of {percent(band)}"
     return parts.chart(
-        "", "", None, x=along, y=parts.label("density", unit),
+        "", "", None,
+        x=parts.label(name.replace("_", " "), unit), y=parts.label("density", f"1/{unit}"),
         series=[
             parts.series(f"simulated: median{share}", edge, median, ends=(low, high), style="step"),
             parts.series("recording", edge, real, style="step"),

@@ -61,12 +61,9 @@ def kinetics_sections(*, kinetics: xr.Dataset | None = None) -> list[Section]:
         parts.table_part("models", "Models", score_table),
     ]
     if kinetics is not None and "target" in kinetics.attrs:
-        title = "Way to the target"
-        way = parts.table_part("target", title, target_table)
-        pieces.insert(0, way)
+        pieces.insert(0, parts.table_part("target", "Way to the target", target_table))
     if kinetics is not None and kinetics.sizes.get("source") == 2:
-        name = "Equal rates"
-        pieces.append(parts.table_part("equal", name, equal_table))
+        pieces.append(parts.table_part("equal", "Equal rates", equal_table))
     nothing = "There are no rates yet."
     return parts.sections_of(kinetics, nothing, kinetics_summary, lambda _: [], pieces)
 

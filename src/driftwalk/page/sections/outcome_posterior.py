@@ -22,6 +22,11 @@ from driftwalk.schema.answers.parts import each
 if TYPE_CHECKING:
     import xarray as xr
 
+DATA_NOTE = (
+    "Simulated data sets at parameters drawn from the posterior were inferred with the same "
+    "emulator. The power widens the likelihood until the regions hold their truths; the "
+    "intervals are medians, over those that hold without data."
+)
 BINS = 40
 """Bins of a marginal density; chosen by hand."""
 
@@ -47,7 +52,7 @@ def outcome_posterior_sections(*, posterior: xr.Dataset | None = None) -> list[S
     pieces: list[tuple[str, str, Maker]] = [
         ("posterior", "Posterior", density_sections),
         parts.table_part("classes", "Classes", class_table),
-        ("data", "Information in each kind of data", _data_section),
+        parts.table_part("data", "Information in each kind of data", data_table, DATA_NOTE),
     ]
     nothing = "The emulator is not checked yet: there is no posterior."
     return parts.sections_of(posterior, nothing, posterior_summary, lambda _: [], pieces)
@@ -108,13 +113,3 @@ def density_sections(posterior: xr.Dataset) -> list[Section]:
             )
         )  # fmt: skip
     return made
-
-
-def _data_section(posterior: xr.Dataset) -> Section:
-    note = (
-        "Simulated data sets at parameters drawn from the posterior were inferred with the same "
-        "emulator. The power widens the likelihood until the regions hold their truths; the "
-        "intervals are medians, over those that hold without data."
-    )
-    table = data_table(posterior)
-    return parts.section_of_table("data", "Information in each kind of data", table, note)

@@ -87,17 +87,10 @@ def recording_sections(
     noises = _by_body(noise, chosen)
     made: list[Section] = []
     for number_of, name in enumerate(chosen, start=1):
-        made += parts.attempt(
-            f"recording-{number_of}",
-            "The recording" if len(names) == 1 else f"The recording, body {name}",
-            partial(
-                trajectory_section,
-                trajectory,
-                body=name,
-                noise=noises.get(name),
-                id=f"recording-{number_of}",
-            ),
-        )
+        id = f"recording-{number_of}"
+        title = "The recording" if len(names) == 1 else f"The recording, body {name}"
+        make = partial(trajectory_section, trajectory, body=name, noise=noises.get(name), id=id)
+        made += parts.attempt(id, title, make)
     if body is None and len(names) > SECTION.most_bodies:
         made[-1]["note"] = (
             f"{made[-1]['note'] or ''} {len(names) - SECTION.most_bodies} more bodies."

@@ -20,9 +20,8 @@ from driftwalk.core.errors import InputError
 from driftwalk.schema.check import described
 from driftwalk.track.follow.assign import assign
 from driftwalk.track.follow.kalman import STATES, Measured, edge_costs, predict, start_state, update
-from driftwalk.track.follow.marks import Marks
+from driftwalk.track.follow.marks import Marks, Rivals
 from driftwalk.track.follow.naming import Naming
-from driftwalk.track.follow.rivals import Rivals
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracks import (
     COVARIANCE,
