@@ -86,8 +86,8 @@ def demo(
     calibration = open_netcdf(out / CALIBRATION / "calibration.nc")
     _write_page(out, FIT, CALIBRATION)
     if json:
-        search = calibration_answer(calibration).facts
-        print_json({"truth": demo_truth(), "fit": fitted, "calibration": search})
+        found = calibration_answer(calibration).facts
+        print_json({"truth": demo_truth(), "fit": fitted, "calibration": found})
     else:
         print_calibration(calibration)
         _print_places(out, out / PAGE)

@@ -15,7 +15,7 @@ PANEL: Final = "Parameters"
 READING: Final = "How to read the recording"
 """The panels of the help that several commands have."""
 SCALE: Final = "Size of a pixel, such as 0.5mm or 2000px/m."
-"""What the option for the scale of an image says."""
+"""Help of the option for the scale of an image."""
 
 
 def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
