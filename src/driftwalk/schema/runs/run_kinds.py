@@ -75,7 +75,7 @@ class RunKind:
     figures: Maker | None = None
     live: Maker | None = None
     answer: Maker | None = None
-    places: Mapping[str, str] = field(default_factory=lambda: {"figures": "figures"})
+    places: Mapping[str, str] = field(default_factory=dict)
     flow: Maker | None = None
     gives_model: bool = False
     no_draws: str = "no uncertainty of its values, as a fit or a calibration has"
@@ -120,6 +120,7 @@ BUILT_IN: Final = (
         gives_model=True,
         no_draws="no joint region to draw parameters from (`calibration.bootstrap` of 0)",
         answer=f"{_ANSWERS}.calibration:calibration_answer",
+        places={"figures": "figures"},
     ),
     RunKind(
         name="fit",
@@ -182,6 +183,7 @@ BUILT_IN: Final = (
         figures="driftwalk.figures.assembly:kinetics_figures",
         page=f"{_SECTIONS}.kinetics:kinetics_sections",
         answer=f"{_ANSWERS}.kinetics:kinetics_answer",
+        places={"figures": "figures"},
     ),
     RunKind(
         name="outcome_posterior",
@@ -193,6 +195,7 @@ BUILT_IN: Final = (
         figures="driftwalk.figures.assembly:outcome_posterior_figures",
         page=f"{_SECTIONS}.outcome_posterior:outcome_posterior_sections",
         answer=f"{_ANSWERS}.outcome_posterior:outcome_posterior_answer",
+        places={"figures": "figures"},
     ),
     RunKind(
         name="yield",
@@ -205,6 +208,7 @@ BUILT_IN: Final = (
         page=f"{_SECTIONS}.yields:yield_sections",
         live=f"{_WATCH}.yields:RunningYield",
         answer=f"{_ANSWERS}.yields:yield_answer",
+        places={"figures": "figures"},
     ),
     RunKind(
         name="control_policy",
@@ -216,6 +220,7 @@ BUILT_IN: Final = (
         figures="driftwalk.figures.assembly:policy_figures",
         page=f"{_SECTIONS}.control:policy_sections",
         answer=f"{_ANSWERS}.control:policy_answer",
+        places={"figures": "figures"},
     ),
     RunKind(
         name="control_test",
@@ -228,6 +233,7 @@ BUILT_IN: Final = (
         figures="driftwalk.figures.assembly:trial_figures",
         page=f"{_SECTIONS}.control:trial_sections",
         answer=f"{_ANSWERS}.control:trial_answer",
+        places={"figures": "figures"},
     ),
     RunKind(
         name="recovery",
@@ -267,6 +273,7 @@ BUILT_IN: Final = (
         page=f"{_SECTIONS}.motion_models:model_calibration_sections",
         gives_model=True,
         answer=f"{_ANSWERS}.calibration:model_calibration_answer",
+        places={"figures": "figures"},
     ),
     RunKind(
         name="model_recovery",
