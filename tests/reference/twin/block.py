@@ -360,7 +360,8 @@ def resolve_contacts(
 
 def _normal_impulses(rows: Floats, inverse_mass: Floats, wanted: Floats, joint: bool) -> Floats:
     matrix = (rows * inverse_mass) @ rows.T
-    if joint:
+    # Two contacts at one point are one: on some processors their matrix is exactly singular.
+    if joint and np.linalg.det(matrix) != 0.0:
         both = np.linalg.solve(matrix, wanted)
         if (both > 0).all():
             return np.asarray(both)
