@@ -21,13 +21,13 @@ import xarray as xr
 
 import driftwalk as dw
 from driftwalk.assembly.chains.estimate import empirical_shares
-from driftwalk.assembly.chains.hidden import FORMS, STEPS, fit, shares
+from driftwalk.assembly.chains.hidden import FORMS, GRID_STEPS, fit, shares
 from driftwalk.assembly.chains.histories import histories
 
 SETTINGS = tuple(product((0.0, 0.5, 1.0, 1.5), (0.2, 0.55, 1.2)))
 TIMES = np.array([60.0, 120.0, 300.0])
 RUNS, DURATION = 2000, 300.0
-AT = np.rint(TIMES / DURATION * STEPS).astype(int)
+AT = np.rint(TIMES / DURATION * GRID_STEPS).astype(int)
 HELD_OUT = (2, 3, 4, 5)
 
 

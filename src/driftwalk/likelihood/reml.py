@@ -247,7 +247,7 @@ def _coefficients_at(found: list[Profile], nearest: Profile, log_drag: float) ->
     return nearest.coefficients + share * (second.coefficients - nearest.coefficients)
 
 
-BLOCK = 4096
+SAMPLES_AT_ONCE = 4096
 """Samples whose bases are held at once."""
 
 
@@ -310,8 +310,8 @@ def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other
     states = np.where(seen[:, None], states, 0.0)
     lost = np.any([excluded != 0, ~seen, step > FILTER.longest_gap_s], axis=0)
     memory = np.zeros(spline.size)
-    for begin in range(0, time.size, BLOCK):
-        part = slice(begin, begin + BLOCK)
+    for begin in range(0, time.size, SAMPLES_AT_ONCE):
+        part = slice(begin, begin + SAMPLES_AT_ONCE)
         rows = _bases(spline, states[part, 0], states[part, 1])
         slip = np.hypot(*(mean @ rows.T - states[part, 2:].T))
         # Along the slip the drag k |w| w pulls with 2 k |w|, across it with k |w|: their mean.

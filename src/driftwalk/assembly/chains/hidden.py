@@ -267,11 +267,11 @@ def _maximised(
     )  # fmt: skip
 
 
-STEPS = 600
+GRID_STEPS = 600
 """Steps of the grid; twice as many change no share by .002 (`studies/kinetics`)."""
 
 
-def shares(model: Model, duration: float, *, steps: int = STEPS) -> tuple[Floats, Floats]:
+def shares(model: Model, duration: float, *, steps: int = GRID_STEPS) -> tuple[Floats, Floats]:
     """Return the shares of the classes over time by convolution on a grid.
 
     The mass in a class and hidden state is kept by its age. Mass that enters during a step has

@@ -496,7 +496,7 @@ def _oriented(energy: Energy, contact: float, end: float, *, of_magnets: bool) -
 
 SHOWN_GAP_M: Final = 0.010
 """Gap at which the force is stated: an easy one to set with a spacer."""
-POINTS: Final = 400
+CURVE_POINTS: Final = 400
 """Gaps of the curve, smooth to the eye; chosen by hand."""
 
 
@@ -532,7 +532,7 @@ def attraction(study: Study) -> xr.Dataset | None:
         return None
     forces = [force for force in (pull.faces, pull.centres) if force is not None]
     reach = max(force.cutoff - force.contact for force in forces)
-    gap = np.append(0.0, np.geomspace(1e-4, max(reach, 2e-4), POINTS))
+    gap = np.append(0.0, np.geomspace(1e-4, max(reach, 2e-4), CURVE_POINTS))
 
     def felt_at(gap: Floats) -> Floats:
         return np.asarray(sum(force.force(gap + force.contact) for force in forces))

@@ -55,7 +55,7 @@ class LawPolicy(NamedTuple):
     minutes, and the interval of C_d missed without it."""
     slight_drag: float = 0.1
     """Change of ln C_d by such a power from which on the verdict is "cannot tell": a tenth, as much
-    as a stated C_d may be off. It was 0.15 and 0.18 in two of six recordings with such a power, and
+    as a stated C_d may be off. It was 0.10 to 0.17 in three of six recordings with such a power:
     one of them was said to be explained with a C_d 29 % too large (studies/verdict)."""
     without_orientation: float = 45.0
     """Log evidence for a floating body's law from which it is settled where the turning says

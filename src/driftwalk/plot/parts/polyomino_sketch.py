@@ -460,11 +460,11 @@ def _pinned(
     return artist
 
 
-COLORS: Final = {1: "#C1121F", -1: "#FFFFFF"}
+POLE_COLORS: Final = {1: "#C1121F", -1: "#FFFFFF"}
 """No colour of an assembly."""
 
 
-class BarPolicy(NamedTuple):
+class PoleBarPolicy(NamedTuple):
     """Where a bar lies on its block, in shares of half a side."""
 
     inner: float = 0.62
@@ -475,7 +475,7 @@ class BarPolicy(NamedTuple):
     """End of the bar, so that two bars do not meet; chosen by eye."""
 
 
-BAR: Final = BarPolicy()
+POLE_BAR: Final = PoleBarPolicy()
 
 
 def pole_bars(
@@ -494,10 +494,10 @@ def pole_bars(
     """
     own = half_side * np.array(
         [
-            [BAR.inner, -BAR.length],
-            [BAR.outer, -BAR.length],
-            [BAR.outer, BAR.length],
-            [BAR.inner, BAR.length],
+            [POLE_BAR.inner, -POLE_BAR.length],
+            [POLE_BAR.outer, -POLE_BAR.length],
+            [POLE_BAR.outer, POLE_BAR.length],
+            [POLE_BAR.inner, POLE_BAR.length],
         ]
     )
     corners, colors = [], []
@@ -506,7 +506,7 @@ def pole_bars(
         cosine, sine = np.cos(turn), np.sin(turn)
         turned = own @ np.array([[cosine, sine], [-sine, cosine]])
         corners.append(turned + np.array([x[block], y[block]]))
-        colors.append(COLORS[int(pole[block][face])])
+        colors.append(POLE_COLORS[int(pole[block][face])])
     return corners, colors
 
 
