@@ -90,7 +90,7 @@ public:
     for (std::int64_t i = 0; i < n_; ++i) {
       tied_[i] = 0;
     }
-    KsBucketer bucketer(samples_.n, samples_.buckets, tied_, lists_);
+    KsBucketer bucketer(samples_.n, samples_.buckets, lists_);
     if (!bucketer.cut(samples_.x, columns_) || !bucketer.cut(samples_.y, rows_)) {
       return false;
     }
@@ -128,7 +128,6 @@ private:
     buckets.size[0] = ks_take<std::int32_t>(at_, most + 1);
     buckets.size[1] = ks_take<std::int32_t>(at_, most + 1);
     buckets.is_value = ks_take<std::uint8_t>(at_, most);
-    buckets.knows_ties = ks_take<std::uint8_t>(at_, most);
     buckets.begin = ks_take<std::int32_t>(at_, most + 1);
   }
 

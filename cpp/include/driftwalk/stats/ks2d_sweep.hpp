@@ -54,9 +54,10 @@ void ks_sweep_avx512(const KsSweep& sweep, KsBest best[2]);
 // Sizes of the buckets of an axis. They come with the samples: a function of all instruction sets
 // must not be compiled for one.
 struct KsBucketSizes {
-  std::int64_t points; // that a bucket should hold: more make wide bounds, fewer many buckets
-  std::int64_t bins;   // that an axis is dealt to: some to each bucket
-  std::int64_t most;   // buckets
+  std::int64_t points;    // that a bucket should hold: more make wide bounds, fewer many buckets
+  std::int64_t bins;      // that an axis is dealt to: some to each bucket
+  std::int64_t most_bins; // once crowded ones are split
+  std::int64_t most;      // buckets
 };
 
 constexpr KsBucketSizes ks_bucket_sizes(std::int64_t n) {
@@ -65,10 +66,11 @@ constexpr KsBucketSizes ks_bucket_sizes(std::int64_t n) {
     points += points / 8;
   }
   std::int64_t bins = 128;
-  while (bins * points < 4 * n && bins < 1 << 16) {
+  while (bins * points < 4 * n && bins < 1 << 15) {
     bins *= 2;
   }
-  return {points, bins, 11 * n / (4 * points) + 64};
+  return {points, bins, 9 * bins / 4 < 1 << 16 ? 9 * bins / 4 : 1 << 16,
+          11 * n / (4 * points) + 64};
 }
 
 // The same statistic without an order, of two samples as they come; see KsBounded.
@@ -96,7 +98,7 @@ constexpr std::int64_t ks_bounded_to = std::int64_t(1) << 23;
 
 constexpr std::int64_t ks_bounded_bytes(std::int64_t n) {
   const KsBucketSizes buckets = ks_bucket_sizes(n);
-  return 80 * n + 24 * buckets.bins + 96 * buckets.most + 16 * 1024;
+  return 80 * n + 88 * buckets.most_bins + 96 * buckets.most + 16 * 1024;
 }
 
 // False, with nothing found, where the bounds do not pay; the sweep has to be run.

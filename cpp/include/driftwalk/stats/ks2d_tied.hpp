@@ -54,7 +54,7 @@ public:
   KsTiedCounter(const KsPlain& samples, const KsBucketed& columns, const KsBucketed& rows,
                 std::uint8_t* tied, char* scratch)
       : samples_(samples), n_(samples.n[0] + samples.n[1]), tied_(tied),
-        before_(ks_take<std::int32_t>(scratch, n_)) {
+        before_(ks_take<std::int32_t>(scratch, n_)), met_(ks_take<std::int32_t>(scratch, n_)) {
     mark(columns, samples.x);
     mark(rows, samples.y);
   }
@@ -84,16 +84,26 @@ private:
     for (std::int64_t b = 0; b < buckets.count; ++b) {
       const std::int32_t begin = buckets.begin[b];
       const std::int32_t end = buckets.begin[b + 1];
-      if (buckets.knows_ties[b] != 0) {
+      if (buckets.is_value[b] != 0) {
+        for (std::int32_t k = begin; k < end; ++k) {
+          tied_[records[k].point()] = 1;
+        }
         continue;
       }
+      // Points that met another, without a branch: in samples with ties no one foretells which do.
+      std::int32_t count = 0;
       for (std::int32_t k = begin; k < end; ++k) {
-        const KsRecord own = records[k];
-        std::int32_t& place = last[own.hash() >> shift];
-        std::int32_t other = place;
+        std::int32_t& place = last[records[k].hash() >> shift];
+        const std::int32_t other = place;
         before[k] = other;
         place = k;
-        for (; other >= begin; other = before[other]) {
+        met_[count] = k;
+        count += other >= begin;
+      }
+      for (std::int32_t m = 0; m < count; ++m) {
+        const std::int32_t k = met_[m];
+        const KsRecord own = records[k];
+        for (std::int32_t other = before[k]; other >= begin; other = before[other]) {
           const KsRecord met = records[other];
           if (own.hash() == met.hash() && own.value(values, n1) == met.value(values, n1)) {
             tied_[own.point()] = tied_[met.point()] = 1;
@@ -108,6 +118,7 @@ private:
   std::int64_t n_;
   std::uint8_t* tied_;   // by point
   std::int32_t* before_; // by place in a bucket
+  std::int32_t* met_;    // such places
 };
 
 DRIFTWALK_LANES_END
