@@ -36,7 +36,7 @@ from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
 from driftwalk.model.tank import Tank, Water
 
 if TYPE_CHECKING:
-    from driftwalk.model.bodies import RigidBody
+    from driftwalk.model.rigid_bodies import RigidBody
 
 
 class Study(Section):

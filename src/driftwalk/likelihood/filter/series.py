@@ -23,7 +23,7 @@ from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
 if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.model.block import Block
-    from driftwalk.model.bodies import RigidBody
+    from driftwalk.model.rigid_bodies import RigidBody
     from driftwalk.schema import Track
 
 
