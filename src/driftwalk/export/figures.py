@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import write_atomic
-from driftwalk.core.files.bounded import text_of_name
 from driftwalk.core.files.run_layout import run_file, state_of
+from driftwalk.core.text_files import text_of_name
 from driftwalk.export.target import Source, Target
 from driftwalk.schema.check import check_contents
 from driftwalk.schema.runs import StoredRun, open_run_folder

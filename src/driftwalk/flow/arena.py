@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 
 Array = npt.NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from driftwalk.conditions import one_body_each, require_travel
 from driftwalk.conditions.refuse import prefix_of
 from driftwalk.conditions.study import fitted_law, is_fitted
 from driftwalk.core.errors import InputError, argument_text
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.flow.arena import outline_of, read_arena
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 from pydantic import Field, model_validator
 
 from driftwalk.core.errors import ConfigurationError, FormatError, did_you_mean
-from driftwalk.core.text.toml_text import parse_toml, read_toml
+from driftwalk.core.text_files import parse_toml, read_toml
 from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block, Flow, Forces
 from driftwalk.model.calibration import Calibration

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.schema.description import Attribute, Kind, Variable
 from driftwalk.schema.kinds import KINDS, find_kind
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.files.atomic import require_free, write_atomic
-from driftwalk.core.text.json_text import json_value
+from driftwalk.core.text_files import json_value
 from driftwalk.export.data.motion import Motion, frame_rate
 from driftwalk.schema import body_names
 from driftwalk.schema.stores.netcdf import netcdf_bytes

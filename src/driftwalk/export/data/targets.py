@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.core.files.atomic import write_atomic
-from driftwalk.core.files.bounded import text_of_name
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json, text_of_name
 from driftwalk.export.data.motion import Motion, find_motions, frame_rate
 from driftwalk.export.data.movement import write_movement
 from driftwalk.export.data.ros import first_stamp, topics, write_ros

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.plot.parts.labels import FACTORS
 from driftwalk.plot.parts.style import INK
 
