@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.arrays import Bools, Floats
-from driftwalk.core.memoize import remembered
+from driftwalk.core.arrays import Bools, Floats, remembered
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
 

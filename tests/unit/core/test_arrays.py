@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.memoize import KEPT, remembered
+from driftwalk.core.arrays import KEPT, remembered
 
 Floats = npt.NDArray[np.float64]
 
