@@ -1,4 +1,7 @@
-"""Short names for the types of arrays, and results of functions of arrays, kept for the next call."""
+"""Short names for the types of arrays, and the memory of costly functions of arrays.
+
+A command prepares the same recording for its fit, for the check of the fit and for its figures.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ Keys = npt.NDArray[np.uint64]
 """Addresses of random numbers, one for each world."""
 
 
-KEPT: Final = 16
+MOST_REMEMBERED: Final = 16
 """Results of a function that are kept."""
 
 P = ParamSpec("P")
@@ -61,7 +64,7 @@ def remembered(call: Callable[P, T]) -> Callable[P, T]:
             return known
         found = call(*args, **kwargs)
         results[key] = found
-        while len(results) > KEPT:
+        while len(results) > MOST_REMEMBERED:
             results.popitem(last=False)
         return found
 

@@ -56,8 +56,8 @@ def bounded_text(path: Path) -> bytes:
         text = file.read(MOST_JSON_BYTES + 1)
     if len(text) > MOST_JSON_BYTES:
         raise FormatError(
-            f"holds more than {MOST_JSON_BYTES / MIB:g} MiB of JSON: store it as CSV, which is read "
-            "piece by piece"
+            f"holds more than {MOST_JSON_BYTES / MIB:g} MiB of JSON: store it as CSV, which is "
+            "read piece by piece"
         )
     return text
 
