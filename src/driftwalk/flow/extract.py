@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.smoothing import local_quadratic
 from driftwalk.flow.arena import Outline, outline_of, read_arena
@@ -20,10 +21,10 @@ from driftwalk.flow.cell_means import (
     Samples,
     average_cells,
     coverage_warnings,
+    fill_velocity,
     flags_of,
     measured_share,
 )
-from driftwalk.flow.fill import fill_velocity
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.schema import body_names, body_track, build_flow_field, check_trajectory
 
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 Inertia = Literal["corrected", "none"]
 
 ALL_BODIES = "all"
@@ -42,7 +41,7 @@ ALL_BODIES = "all"
 class _Smoothed:
     """Samples with derivatives, and how many had none."""
 
-    position: Array
+    position: Floats
     samples: Samples
     without_derivative: int
 
@@ -141,7 +140,7 @@ def extract_flow(
     outline = outline_of(described)
     grid = make_grid(outline, cells=cells, cell_size=cell_size)
     settings: dict[str, Any] = {"inertia": inertia, "min_count": min_count, "window_s": window}
-    correction: Callable[[Array], Array] = np.zeros_like
+    correction: Callable[[Floats], Floats] = np.zeros_like
     if inertia == "corrected":
         physics = {
             "mass": _required(mass, "mass"),
@@ -256,7 +255,7 @@ def _nothing_measured(smoothed: _Smoothed, inside: Samples, min_count: int, wind
 
 
 def _dataset(
-    grid: Grid, outline: Outline, means: CellMeans, measured: Mask, settings: dict[str, Any]
+    grid: Grid, outline: Outline, means: CellMeans, measured: Bools, settings: dict[str, Any]
 ) -> xr.Dataset:
     flag = flags_of(grid, outline, measured)
     flow = fill_velocity(grid, means.flow.reshape(*grid.shape, 2), known=measured, outline=outline)
@@ -297,7 +296,7 @@ def inertia_correction(
     area: float,
     water_density: float = 1000.0,
     flow_drag_coefficient: float = 1.05,
-) -> Array:
+) -> Floats:
     """Return the velocity of the water relative to the body that it carries.
 
     A body of mass m that accelerates by a feels the force m a. If that force is the quadratic drag

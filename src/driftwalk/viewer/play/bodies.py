@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.conditions import Conditions
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import world_keys
 from driftwalk.motion import MotionModel, ParticleModel, Worlds, model_start
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-Floats = npt.NDArray[np.float64]
 
 STRETCH_S: Final = 300.0
 """Time that is simulated at once [s]."""

@@ -10,12 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly import LiveTank
+from driftwalk.core.arrays import Floats
 
 if TYPE_CHECKING:
     from driftwalk.assembly.live_world import LiveEvent
-
-
-Floats = npt.NDArray[np.float64]
 
 
 def hello_line(tank: LiveTank) -> dict[str, Any]:
