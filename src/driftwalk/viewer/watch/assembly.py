@@ -13,7 +13,7 @@ from driftwalk.assembly import outcome_distribution, world_class
 from driftwalk.assembly.outcomes.class_names import disc_class
 from driftwalk.page.parts import section
 from driftwalk.page.sections.outcomes import class_items
-from driftwalk.plot.parts.assembly_labels import class_names
+from driftwalk.plot.parts.outcome_classes import class_names
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.viewer.watch.run_page import Running, Section
 from driftwalk.viewer.watch.shards import FinishedUnit

@@ -23,8 +23,7 @@ from driftwalk.page import encode_array
 from driftwalk.page.parts import axis, section
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.page.sections.sensitivity_maps import over_time_part, ranked_axes
-from driftwalk.plot.parts.assembly_labels import classes_to_show
-from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.plot.parts.outcome_classes import are_discs, classes_to_show
 from driftwalk.schema.kinds.sensitivity import axis_number
 from driftwalk.schema.shapes import counted_assemblies
 from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
