@@ -15,10 +15,9 @@ from driftwalk.schema.kinds import (
     model_check,
     models,
     motion,
-    outcome_posterior,
+    outcomes,
     recovery,
     sensitivity,
-    steady_state,
     yields,
 )
 from driftwalk.schema.parameters import is_block, stored_parameters
@@ -27,8 +26,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _FILES: Final = (
-    motion, flow, calibration, models, fit, recovery, model_check, assembly, steady_state,
-    sensitivity, kinetics, outcome_posterior, yields, control,
+    motion, flow, calibration, models, fit, recovery, model_check, assembly, outcomes, sensitivity,
+    kinetics, yields, control,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}
