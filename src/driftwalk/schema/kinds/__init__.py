@@ -18,7 +18,6 @@ from driftwalk.schema.kinds import (
     outcomes,
     recovery,
     sensitivity,
-    yields,
 )
 from driftwalk.schema.parameters import is_block, stored_parameters
 
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 _FILES: Final = (
     motion, flow, calibration, models, fit, recovery, model_check, assembly, outcomes, sensitivity,
-    kinetics, yields, control,
+    kinetics, control,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}
