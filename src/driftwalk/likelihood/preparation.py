@@ -16,12 +16,11 @@ from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text_files import parse_json
 from driftwalk.flow.arena import outline_of, read_arena
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.parameters import Point, body_of
 from driftwalk.likelihood.filter.series import (
     FILTER,
     ORIENTED_SHARE,
     Series,
-    body_of,
     series_of,
     stretches_unsettled,
     usable_intervals,
