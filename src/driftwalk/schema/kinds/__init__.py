@@ -11,9 +11,7 @@ from driftwalk.schema.kinds import (
     control,
     fit,
     flow,
-    kinetics,
     model_check,
-    models,
     motion,
     outcomes,
     recovery,
@@ -25,8 +23,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _FILES: Final = (
-    motion, flow, calibration, models, fit, recovery, model_check, assembly, outcomes, sensitivity,
-    kinetics, control,
+    motion, flow, calibration, fit, recovery, model_check, assembly, outcomes, sensitivity,
+    control,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}
