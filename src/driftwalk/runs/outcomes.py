@@ -14,7 +14,7 @@ from driftwalk.runs.resumable_run import dataset_hash
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.assembly.outcome_posterior.observed import Outcomes
+    from driftwalk.assembly.outcome_posterior.records import Outcomes
     from driftwalk.model import Study
     from driftwalk.runs.resumable_run import Run
 
