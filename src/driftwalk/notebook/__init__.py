@@ -6,7 +6,7 @@ loaded; a second, different statement is an error.
 
 from driftwalk.notebook.fitting import calibrate, compare_models, fit
 from driftwalk.notebook.outcomes import infer_outcomes, maximise_yield
-from driftwalk.notebook.result import report
+from driftwalk.notebook.reporting import report
 from driftwalk.notebook.simulating import assemble, compare, kinetics, simulate
 
 __all__ = [
