@@ -30,12 +30,12 @@ from driftwalk.calibration.warnings import OWN_FLOW, fit_disagreements, wall_war
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import jump_warnings, study_in_arena, unstated_warning
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.core.processors import run_in_background
 from driftwalk.core.run_stages import share_of_windows, tell_nobody
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.motion.protocol import ScoresItself
 from driftwalk.schema.answers.facts import taken_keys, taken_names
-from driftwalk.schema.parameters import MOST_SETTINGS
 from driftwalk.simulation.series import is_series, series_warnings
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.grid import MOST_SETTINGS, check_axis, grid_values
 from driftwalk.model.block import DragCoefficient, ForceStd
 from driftwalk.model.section import Quantity, Section, Seed
-from driftwalk.schema.parameters import MOST_SETTINGS, check_axis, grid_values
 
 DragCoefficientStep = Annotated[float, Quantity("1", gt=0, le=100)]
 ForceStdStep = Annotated[float, Quantity("N", gt=0, le=10)]

@@ -8,13 +8,13 @@ from typing import Annotated, Any, ClassVar, Final, Self
 from pydantic import Field, field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
 from driftwalk.model.binding import faces_text
 from driftwalk.model.block import DragCoefficient, ForceStd
 from driftwalk.model.calibration import ForceGrid
 from driftwalk.model.interaction import MagnetText, parse_magnet
 from driftwalk.model.section import Quantity, Seed
-from driftwalk.schema.parameters import MOST_SETTINGS
 
 AXES: Final[dict[str, str]] = {
     "tank_diameter": "tank_diameter_m",

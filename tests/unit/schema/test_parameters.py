@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.grid import grid_values
 from driftwalk.model import Calibration
 from driftwalk.schema import Parameter
-from driftwalk.schema.parameters import grid_values, unit_suffix
+from driftwalk.schema.parameters import unit_suffix
 
 
 def test_grid_values_are_the_decimals_of_the_study() -> None:
