@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, OPENING, PARTING
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, put_beside, shape_order
-from driftwalk.assembly.lattice.rigid_joins import CLOSING, JOINING, OPENING, PARTING
 from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import (

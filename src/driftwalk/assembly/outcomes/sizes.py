@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
 from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
 from driftwalk.assembly.outcomes.distribution import (
     at_times,

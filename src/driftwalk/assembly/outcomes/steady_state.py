@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
+from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
 from driftwalk.assembly.outcomes.distribution import (
     class_names,
     copied_attrs,
