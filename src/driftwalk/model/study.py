@@ -1,4 +1,7 @@
-"""The study: every parameter of a piece of work, in one frozen object and one TOML file."""
+"""The study: every parameter of a piece of work, in one frozen object and one TOML file.
+
+A new study file comes from a template with comments; the reference page shows the same table.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""A tracker's stream: read over TCP, handed on to the browsers, found again when it was lost."""
+"""A tracker's stream: read over TCP, filtered, handed on to the browsers, found again when lost.
+
+A stream comes from another program, and any of its values may be wrong. Wrong values are left out,
+counted, and reported in one sentence that is brought up to date now and then. A body that cannot be
+drawn is left out, not its frame.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Detector of two-colour markers: two discs of different hue give position and orientation."""
+"""Detector of two-colour markers: two discs of different hue give position and orientation.
+
+Discs are connected regions of one colour; an assignment pairs them.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The playground of blocks: a tank that moves while its parameters are changed."""
+"""The playground of blocks: a tank that moves while its parameters are changed.
+
+It is published in the form of a tracker's stream too, so that one page can watch both.
+"""
 
 from __future__ import annotations
 
