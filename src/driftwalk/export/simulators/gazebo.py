@@ -7,12 +7,7 @@ from string import Template
 from typing import Final
 
 from driftwalk.export.simulators.block import Block
-from driftwalk.export.simulators.compiled import (
-    compiler,
-    verify_force,
-    wall_texts,
-    write_plugin,
-)
+from driftwalk.export.simulators.compiled import compiler, verify_force, wall_texts, write_plugin
 from driftwalk.export.simulators.parts import Folder, start_pose, stored_text
 from driftwalk.export.target import Source, Verification
 

@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from driftwalk.schema.description import (
-    SOURCE_WARNINGS,
-    Variable,
-    attributes,
-    kind,
-    variables,
-)
+from driftwalk.schema.description import SOURCE_WARNINGS, Variable, attributes, kind, variables
 from driftwalk.schema.kinds.flow import FLOW_SERIES, began_in_flow
 from driftwalk.schema.kinds.motion import WORLD_STATUS
 
