@@ -206,7 +206,7 @@ BUILT_IN: Final = (
         file="yields.nc",
         figures="driftwalk.figures.assembly:yield_figures",
         page=f"{_SECTIONS}.yields:yield_sections",
-        live=f"{_WATCH}.yields:RunningYield",
+        live=f"{_WATCH}.assembly:RunningYield",
         answer=f"{_ANSWERS}.yields:yield_answer",
         places={"figures": "figures"},
     ),
