@@ -6,9 +6,9 @@ Empty cells are filled by a smooth interpolation of the measured ones that respe
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,10 @@ from driftwalk.core.arrays import Bools, Floats, Indices
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline
 from driftwalk.flow.grid import Grid
-from driftwalk.schema import FLAGS
+from driftwalk.schema import FLAGS, build_flow_field
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -183,6 +186,57 @@ def coverage_warnings(
             "out: check the scale, the origin and the arena."
         )
     return sentences
+
+
+def field_of_cells(
+    grid: Grid,
+    outline: Outline | None,
+    means: CellMeans,
+    measured: Bools,
+    settings: Mapping[str, Any],
+    *,
+    doubts: Sequence[str] = (),
+    **more: Floats,
+) -> xr.Dataset:
+    """Return the flow field of the means over cells, with the empty ones filled.
+
+    Parameters
+    ----------
+    grid, outline, means : Grid, Outline or None, CellMeans
+        The cells, the tank, and the means.
+    measured : ndarray of bool, shape (ny, nx)
+        Which cells have data.
+    settings : mapping
+        Attributes, with ``samples_used`` and ``samples_outside_tank``.
+    doubts : sequence of str
+        Sentences for the warning, besides those on the coverage.
+    **more : ndarray, shape (ny, nx)
+        Further variables.
+    """
+    flag = flags_of(grid, outline, measured)
+    share = measured_share(flag)
+    used, beyond = settings["samples_used"], settings["samples_outside_tank"]
+    cells = "the cells" if outline is None else "the tank's cells"
+    coverage = coverage_warnings(share, used=used, beyond=beyond, cells=cells)
+    warning = " ".join([*coverage, *doubts])
+    flow = fill_velocity(grid, means.flow.reshape(*grid.shape, 2), known=measured, outline=outline)
+    error = np.where(measured[..., None], means.standard_error.reshape(*grid.shape, 2), np.nan)
+    return build_flow_field(
+        grid.x,
+        grid.y,
+        u=flow[..., 0],
+        v=flow[..., 1],
+        flag=flag,
+        attrs={
+            **settings,
+            "measured_share": share,
+            "filled_share": 1.0 - share,
+            **({"warning": warning} if warning else {}),
+        },
+        **more,
+        u_standard_error=error[..., 0],
+        v_standard_error=error[..., 1],
+    )
 
 
 _MAX_ITERATIONS = 20_000

@@ -18,17 +18,9 @@ import numpy.typing as npt
 from driftwalk.core.arrays import Bools, Floats, Indices
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of, read_arena
-from driftwalk.flow.cell_means import (
-    CellMeans,
-    Samples,
-    average_cells,
-    coverage_warnings,
-    fill_velocity,
-    flags_of,
-    measured_share,
-)
+from driftwalk.flow.cell_means import CellMeans, Samples, average_cells, field_of_cells
 from driftwalk.flow.grid import Grid, make_grid
-from driftwalk.schema import build_flow_field, check_trajectory
+from driftwalk.schema import check_trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -426,7 +418,16 @@ def flow_from_tracers(
         "source": str(trajectory.attrs.get("source", "")),
         **({} if tank is None else {"arena": json.dumps(tank)}),
     }
-    return _dataset(grid, outline, means, measured, settings, _doubts(kept, grid, means, settings))
+    return field_of_cells(
+        grid,
+        outline,
+        means,
+        measured,
+        settings,
+        doubts=_doubts(kept, grid, means, settings),
+        count=means.count.reshape(grid.shape),
+        tracks=means.visits.reshape(grid.shape),
+    )
 
 
 def _check_options(min_count: int, outlier_threshold: float, noise: float | None) -> None:
@@ -503,38 +504,3 @@ def _doubts(steps: Steps, grid: Grid, means: CellMeans, settings: Mapping[str, A
     if not (means.visits > 1).any():
         sentences.append("No cell has two tracks: there are no standard errors; use larger cells.")
     return sentences
-
-
-def _dataset(
-    grid: Grid,
-    outline: Outline | None,
-    means: CellMeans,
-    measured: Bools,
-    settings: Mapping[str, Any],
-    doubts: list[str],
-) -> xr.Dataset:
-    flag = flags_of(grid, outline, measured)
-    share = measured_share(flag)
-    used, beyond = settings["samples_used"], settings["samples_outside_tank"]
-    cells = "the cells" if outline is None else "the tank's cells"
-    coverage = coverage_warnings(share, used=used, beyond=beyond, cells=cells)
-    warning = " ".join([*coverage, *doubts])
-    flow = fill_velocity(grid, means.flow.reshape(*grid.shape, 2), known=measured, outline=outline)
-    error = np.where(measured[..., None], means.standard_error.reshape(*grid.shape, 2), np.nan)
-    return build_flow_field(
-        grid.x,
-        grid.y,
-        u=flow[..., 0],
-        v=flow[..., 1],
-        flag=flag,
-        attrs={
-            **settings,
-            "measured_share": share,
-            "filled_share": 1.0 - share,
-            **({"warning": warning} if warning else {}),
-        },
-        count=means.count.reshape(grid.shape),
-        tracks=means.visits.reshape(grid.shape),
-        u_standard_error=error[..., 0],
-        v_standard_error=error[..., 1],
-    )
