@@ -17,9 +17,10 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.flow.arena import outline_of, read_arena
+from driftwalk.flow.arena import outline_of
 from driftwalk.flow.grid import make_grid
 from driftwalk.schema import FLAGS, build_flow_field
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr

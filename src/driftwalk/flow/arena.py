@@ -10,8 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from driftwalk.core.arrays import Floats
-from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text_files import parse_json
+from driftwalk.core.errors import InputError
+from driftwalk.schema.trajectory import read_arena
 
 SHAPES = ("circle", "rectangle", "polygon")
 
@@ -150,19 +150,6 @@ def outline_of(arena: Mapping[str, Any] | str) -> Outline:
     if shape == "polygon":
         return ConvexPolygon(_convex_corners(facts))
     raise InputError(f"the arena has shape {shape!r}, expected one of {', '.join(SHAPES)}")
-
-
-def read_arena(arena: Mapping[str, Any] | str) -> dict[str, Any]:
-    """Return an arena as a dictionary, from its JSON text or a mapping."""
-    if not isinstance(arena, str):
-        return dict(arena)
-    try:
-        facts = parse_json(arena)
-    except FormatError as error:
-        raise InputError(f"the arena is not JSON text ({error}): got {arena!r}") from error
-    if not isinstance(facts, dict):
-        raise InputError(f"the arena must be an object of keys, got {arena!r}")
-    return facts
 
 
 def _length(facts: Mapping[str, Any], key: str) -> float:

@@ -15,10 +15,11 @@ import numpy.typing as npt
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.smoothing import local_quadratic
-from driftwalk.flow.arena import Outline, outline_of, read_arena
+from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.cell_means import Samples, average_cells, field_of_cells
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.schema import body_names, body_track, check_trajectory
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,7 +18,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.files.atomic import atomic_path, require_target, write_atomic
 from driftwalk.core.text_files import text_of_name
-from driftwalk.flow.arena import Outline, outline_of, read_arena
+from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.cell_means import fill_velocity
 from driftwalk.flow.grid import Grid, grid_rows
 from driftwalk.flow.readers import pivlab, text
@@ -31,6 +31,7 @@ from driftwalk.flow.readers.units import FieldOptions, RawField, raw_to_si, y_wo
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
 from driftwalk.schema.check import check_contents, kind_name
 from driftwalk.schema.stores.netcdf import is_netcdf, kind_of_file, netcdf_bytes, open_netcdf
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,8 +12,9 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.flow.analytic import TANK_30_CM, flow_from_function
-from driftwalk.flow.arena import Outline, outline_of, read_arena
+from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import make_grid
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr

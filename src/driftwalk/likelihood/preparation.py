@@ -14,7 +14,7 @@ from driftwalk.conditions.refuse import prefix_of
 from driftwalk.conditions.study import fitted_law, is_fitted
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text_files import parse_json
-from driftwalk.flow.arena import outline_of, read_arena
+from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point, body_of
 from driftwalk.likelihood.filter.series import (
@@ -52,6 +52,7 @@ from driftwalk.likelihood.tracker_errors.smoothed import require_raw
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.tracker_errors import without_outliers
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,6 +8,7 @@ angle is the signed angle from the step before to this one (the paper's step ang
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -16,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.files.atomic import atomic_path, require_target, write_atomic
+from driftwalk.core.text_files import parse_json
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.stores.netcdf import netcdf_bytes
 
@@ -144,6 +146,19 @@ def check_trajectory(dataset: xr.Dataset) -> xr.Dataset:
             f"{time[at + 1]} s; sort the recording first"
         )
     return dataset
+
+
+def read_arena(arena: Mapping[str, Any] | str) -> dict[str, Any]:
+    """Return an arena as a dictionary, from its JSON text or a mapping."""
+    if not isinstance(arena, str):
+        return dict(arena)
+    try:
+        facts = parse_json(arena)
+    except FormatError as error:
+        raise InputError(f"the arena is not JSON text ({error}): got {arena!r}") from error
+    if not isinstance(facts, dict):
+        raise InputError(f"the arena must be an object of keys, got {arena!r}")
+    return facts
 
 
 def block_of_study(study: object) -> dict[str, Any]:
