@@ -196,7 +196,7 @@ def field_of_cells(
     settings: Mapping[str, Any],
     *,
     doubts: Sequence[str] = (),
-    **more: Floats,
+    **more: npt.ArrayLike,
 ) -> xr.Dataset:
     """Return the flow field of the means over cells, with the empty ones filled.
 
@@ -210,7 +210,7 @@ def field_of_cells(
         Attributes, with ``samples_used`` and ``samples_outside_tank``.
     doubts : sequence of str
         Sentences for the warning, besides those on the coverage.
-    **more : ndarray, shape (ny, nx)
+    **more : array-like, shape (ny, nx)
         Further variables.
     """
     flag = flags_of(grid, outline, measured)
