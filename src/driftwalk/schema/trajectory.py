@@ -138,14 +138,19 @@ def check_trajectory(dataset: xr.Dataset) -> xr.Dataset:
     time = dataset["time"].values
     if time.size and not np.isfinite(time).all():
         raise InputError("not a trajectory dataset: a time stamp is not a finite number")
-    backwards = time[1:] <= time[:-1]
-    if backwards.any():
-        at = int(np.flatnonzero(backwards)[0])
+    require_increasing(time)
+    return dataset
+
+
+def require_increasing(time: Floats) -> None:
+    """Refuse time stamps of which one is not after the one before."""
+    increases = np.diff(time) > 0
+    if not increases.all():
+        at = int(np.flatnonzero(~increases)[0])
         raise InputError(
             f"time does not increase at sample {at + 1}: {time[at]} s is followed by "
             f"{time[at + 1]} s; sort the recording first"
         )
-    return dataset
 
 
 def read_arena(arena: Mapping[str, Any] | str) -> dict[str, Any]:
