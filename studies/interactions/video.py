@@ -21,7 +21,7 @@ import numpy as np
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
+from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
 from driftwalk.assembly.outcomes.steady_state import bridges_of
 from driftwalk.cli.main import main as driftwalk
 

@@ -16,8 +16,7 @@ from command_line import FLOW, here, refusal
 import driftwalk as dw
 from driftwalk.core.errors import FormatError
 from driftwalk.core.files.run_layout import RECORD_FILE
-from driftwalk.core.text.json_text import parse_json
-from driftwalk.core.text.toml_text import parse_toml
+from driftwalk.core.text_files import parse_json, parse_toml
 from driftwalk.schema.stores.netcdf import ALLOWANCE_BYTES, open_netcdf
 
 FRAMES = ("--fps", "10", "--scale", "0.001")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 import xarray as xr
 from every_kind import FORMS, every_kind
+from unknown_names import unknown_names
 
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import check_dataset, unknown_names
+from driftwalk.schema.check import check_dataset
 from driftwalk.schema.kinds import KINDS
 from driftwalk.schema.stores.netcdf import open_netcdf
 

@@ -15,7 +15,7 @@ from command_line import RECORDING, here
 import driftwalk as dw
 from driftwalk.page.sections.kinetics import kinetics_sections
 from driftwalk.plot.kinetics import plot_class_graph, plot_predicted_shares
-from driftwalk.plot.parts.assembly_labels import class_colors
+from driftwalk.plot.parts.outcome_classes import class_colors
 
 pytestmark = pytest.mark.slow
 

@@ -14,7 +14,7 @@ from command_line import here
 from driftwalk.core.errors import InputError, RunDirectoryError
 from driftwalk.core.files.run_layout import state_of
 from driftwalk.core.provenance import read_manifest
-from driftwalk.export.figures import draw_run
+from driftwalk.export.registry import draw_run
 from driftwalk.notebook.result import as_result
 from driftwalk.page import dataset_page, report_page
 from driftwalk.runs import run_folder, run_work

@@ -12,8 +12,7 @@ import xarray as xr
 from hypothesis import assume, given, settings, strategies as st
 
 from driftwalk.export.data.motion import Motion, frame_numbers, frame_rate
-from driftwalk.export.data.movement import write_movement
-from driftwalk.export.data.tables import particle_numbers, write_csv, write_trackpy
+from driftwalk.export.data.writers import particle_numbers, write_csv, write_movement, write_trackpy
 from driftwalk.record import load
 from driftwalk.schema import body_names, body_track, build_trajectory
 

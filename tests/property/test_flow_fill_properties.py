@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from driftwalk.flow.arena import outline_of
-from driftwalk.flow.fill import fill_velocity
+from driftwalk.flow.cell_means import fill_velocity
 from driftwalk.flow.grid import make_grid
 
 ARENAS = st.one_of(

@@ -13,7 +13,7 @@ from single_block import NODES
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.model.bodies import Measures, rigid_body
+from driftwalk.model.rigid_bodies import Measures, rigid_body
 from driftwalk.schema import build_flow_field
 from driftwalk.simulation.backend import Camera, native_model
 

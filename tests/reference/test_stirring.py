@@ -11,7 +11,7 @@ from single_block import INERTIA, MASS, SIDE, Floats, model
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.model.bodies import Measures, rigid_body
+from driftwalk.model.rigid_bodies import Measures, rigid_body
 
 WORLDS = 20_000
 FORCE, STEP = 1e-3, 0.01

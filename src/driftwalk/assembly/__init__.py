@@ -11,8 +11,8 @@ from driftwalk.assembly.lattice.many_blocks import ReplayedEvents
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
 from driftwalk.assembly.outcome_posterior.infer import infer_outcomes
-from driftwalk.assembly.outcome_posterior.observed import read_outcomes
 from driftwalk.assembly.outcome_posterior.problem import check_outcomes
+from driftwalk.assembly.outcome_posterior.records import read_outcomes
 from driftwalk.assembly.outcomes.class_names import (
     class_cells,
     class_name,

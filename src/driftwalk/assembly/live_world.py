@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.join_history import LatticeWorld
-from driftwalk.assembly.lattice.joined_faces import face_table
-from driftwalk.assembly.lattice.rigid_joins import CLOSING, JOINING, PARTING, BondGraph
+from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, PARTING, BondGraph, face_table
 from driftwalk.assembly.outcomes.class_names import disc_class
 from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of

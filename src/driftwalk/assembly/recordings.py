@@ -17,10 +17,10 @@ from driftwalk.assembly.lattice.joined_faces import (
     JoinRules,
     Poses,
     find_joins,
+    rigid_joins,
     smallest_distance,
 )
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
-from driftwalk.assembly.lattice.rigid_joins import rigid_joins
 from driftwalk.assembly.outcomes.class_names import listed_classes, listed_shapes
 from driftwalk.assembly.outcomes.steady_state import (
     bridges_of,

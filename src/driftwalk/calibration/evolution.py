@@ -34,7 +34,7 @@ from driftwalk.core.run_stages import Progress, tell_nobody
 from driftwalk.motion import MotionModel, Worlds
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema import Parameter
-from driftwalk.simulation.backend import wall_edges
+from driftwalk.simulation.backend import wall_depth
 from driftwalk.sweep import Store, WorkUnit, run_sweep
 
 
@@ -113,18 +113,7 @@ def wall_distance(like: Conditions) -> WallDistance:
 
     It pickles.
     """
-    radius = like.tank.radius_m
-    if radius is not None:
-        return partial(_from_circle, radius)
-    return partial(_from_edges, wall_edges(like.tank))
-
-
-def _from_circle(radius: float, x: Floats, y: Floats) -> Floats:
-    return np.asarray(radius - np.hypot(x, y))
-
-
-def _from_edges(edges: Floats, x: Floats, y: Floats) -> Floats:
-    return np.asarray(np.min([far - nx * x - ny * y for nx, ny, far in edges], axis=0))
+    return partial(wall_depth, like.tank)
 
 
 Objective = Callable[[Floats, int, int], Floats]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, NamedTuple, Typ
 
 import numpy as np
 
-from driftwalk.calibration.estimation.identifiability import DETERMINED
+from driftwalk.calibration.estimation.identifiability import DETERMINED, relative_half_width
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import proportion_interval
@@ -303,7 +303,4 @@ def interval_half_width(
     if start < low + room or end > high - room:
         return float("inf")
     factor = float(ndtri(0.5 + 0.5 * DETERMINED.confidence) / ndtri(0.5 + 0.5 * confidence))
-    if parameter.scale == "log":
-        return 0.5 * factor * float(np.log(ends[1] / ends[0]))
-    size = max(abs(value), DETERMINED.small_part * (parameter.high - parameter.low))
-    return 0.5 * factor * float(ends[1] - ends[0]) / size
+    return factor * relative_half_width(float(ends[0]), value, float(ends[1]), parameter)

@@ -10,13 +10,7 @@ from driftwalk.cli.inputs.model_source import load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared_types import (
-    Json,
-    Overwrite,
-    argument,
-    flow_of_run,
-    option,
-)
+from driftwalk.cli.options.shared_types import Json, Overwrite, argument, flow_of_run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result

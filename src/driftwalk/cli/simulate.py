@@ -23,7 +23,7 @@ from driftwalk.cli.terminal.output import (
 )
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import STUDY_KEYS
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.schema.kinds.flow import flow_series_words
 
 if TYPE_CHECKING:

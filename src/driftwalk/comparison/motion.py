@@ -14,7 +14,7 @@ from driftwalk.comparison.significance import PermutationTest, block_permutation
 from driftwalk.comparison.statistic import joint_density, step_length_edges, turning_angle_edges
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.schema import body_track
 from driftwalk.schema.check import build_dataset
 

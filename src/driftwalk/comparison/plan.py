@@ -20,7 +20,7 @@ from driftwalk.comparison.ks import ComparisonWarning
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_track
-from driftwalk.schema.trajectory import Track, build_steps
+from driftwalk.schema.trajectory import Track, build_steps, require_increasing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -230,13 +230,7 @@ def _checked_times(time: npt.ArrayLike) -> Floats:
     stamps = np.asarray(time, dtype=np.float64)
     if stamps.ndim != 1 or stamps.size < 3:
         raise InputError(f"steps need at least three samples, got time stamps {stamps.shape}")
-    increases = np.diff(stamps) > 0
-    if not increases.all():
-        at = int(np.flatnonzero(~increases)[0])
-        raise InputError(
-            f"time does not increase at sample {at + 1}: {stamps[at]} s is followed by "
-            f"{stamps[at + 1]} s; sort the recording first"
-        )
+    require_increasing(stamps)
     if not np.isfinite(stamps[[0, -1]]).all():
         raise InputError("the first or last time stamp is not a finite number")
     return stamps

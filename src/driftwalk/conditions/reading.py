@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 from driftwalk.conditions.refuse import prefix_of, require_motion, require_positions
 from driftwalk.conditions.study import is_stated, study_for, study_in_arena
 from driftwalk.core.errors import InputError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.record import load
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ import numpy as np
 
 from driftwalk.conditions.camera import recorded_camera
 from driftwalk.core.errors import InputError
-from driftwalk.flow.arena import read_arena
 from driftwalk.record import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.schema import Track, body_names, body_track
 from driftwalk.schema.tracker_errors import mistakes_warning, without_far_outliers
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,12 +10,13 @@ import numpy as np
 from driftwalk.conditions.refuse import prefix_of
 from driftwalk.core.errors import InputError
 from driftwalk.core.units import in_percent
-from driftwalk.flow.arena import outline_of, read_arena
+from driftwalk.flow.arena import outline_of
 from driftwalk.schema import body_track
 from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import kind_name
 from driftwalk.schema.tracker_errors import noise_reach
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr

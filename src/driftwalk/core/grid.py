@@ -1,4 +1,7 @@
-"""Axes of a grid of settings: their ends, their step, their values."""
+"""Axes of a grid of settings: their ends, their step, their values.
+
+The study and the declaration of a parameter share it; a study loads neither NumPy nor a schema.
+"""
 
 from __future__ import annotations
 

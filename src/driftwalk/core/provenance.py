@@ -14,8 +14,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.files.atomic import write_atomic
-from driftwalk.core.files.bounded import text_of_name
-from driftwalk.core.text.json_text import read_json
+from driftwalk.core.text_files import read_json, text_of_name
 
 MANIFEST_VERSION: Final = 1
 MANIFEST_KIND: Final = "driftwalk manifest"

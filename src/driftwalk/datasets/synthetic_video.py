@@ -18,19 +18,17 @@ from driftwalk.core.arrays import Floats, Singles
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.core.random_streams import VideoStream
-from driftwalk.datasets.synthetic_video_light import (
+from driftwalk.datasets.synthetic_video_settings import (
     Bars,
+    Colour,
     Glare,
+    VideoSettings,
+    image_to_world,
+    local_scale,
     marker_points,
     place_bars,
     ripples,
     shading,
-)
-from driftwalk.datasets.synthetic_video_settings import (
-    Colour,
-    VideoSettings,
-    image_to_world,
-    local_scale,
     world_to_image,
 )
 

@@ -17,11 +17,10 @@ from driftwalk.flow.analytic import (
     vortex_velocity,
 )
 from driftwalk.flow.extract import extract_flow, inertia_correction
+from driftwalk.flow.files import flow_format, load_flow, save_flow
 from driftwalk.flow.grid import bilinear, stretch_flow
 from driftwalk.flow.random_flow import random_tank_flow
-from driftwalk.flow.read import flow_format, load_flow
 from driftwalk.flow.tracers import flow_from_tracers
-from driftwalk.flow.write import save_flow
 
 __all__ = [
     "bilinear",

@@ -15,16 +15,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.flow.arena import outline_of, read_arena
+from driftwalk.flow.arena import outline_of
 from driftwalk.flow.grid import make_grid
 from driftwalk.schema import FLAGS, build_flow_field
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
-Velocity = Callable[[Array, Array], tuple[Array, Array]]
+Velocity = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 TANK_30_CM: dict[str, Any] = {"shape": "circle", "diameter_m": 0.3, "center_m": [0.0, 0.0]}
 """The tank of the paper."""
@@ -32,7 +33,7 @@ TANK_30_CM: dict[str, Any] = {"shape": "circle", "diameter_m": 0.3, "center_m": 
 
 def uniform_velocity(
     x: npt.ArrayLike, y: npt.ArrayLike, *, u: float = 0.0, v: float = 0.0
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Return the same velocity at every position.
 
     Parameters
@@ -62,7 +63,7 @@ def vortex_velocity(
     *,
     angular_velocity: float,
     core_radius: float | None = None,
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Return the velocity of a vortex about the origin.
 
     Solid rotation ``w r``; with a core radius c a Rankine vortex, ``w c² / r`` beyond it.
@@ -87,7 +88,7 @@ def vortex_velocity(
     -0.2
     """
     at_x, at_y = _positions(x, y)
-    rate: Array | float = angular_velocity
+    rate: Floats | float = angular_velocity
     if core_radius is not None:
         if not core_radius > 0.0:
             raise InputError(f"core_radius must be positive, got {core_radius}")
@@ -98,7 +99,7 @@ def vortex_velocity(
 
 def shear_velocity(
     x: npt.ArrayLike, y: npt.ArrayLike, *, rate: float, at_rest: float = 0.0
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Return a flow along x that grows along y: ``u = rate (y - at_rest)``, ``v = 0``.
 
     Parameters
@@ -130,7 +131,7 @@ def jets_velocity(
     inclination: float = 0.0,
     swirl_speed: float = 0.04,
     sink_speed: float = 0.01,
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Return the flow of a round tank with inlets in its wall: jets, a swirl and a sink.
 
     From every inlet a Gaussian jet: at a distance s along its axis and n across it, the speed is
@@ -351,7 +352,7 @@ def _named(
     return flow_from_function(partial(velocity, **parameters), attrs=attrs, **grid)
 
 
-def _positions(x: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Array, Array]:
+def _positions(x: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Floats, Floats]:
     at_x, at_y = np.broadcast_arrays(
         np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     )

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.json_text import parse_json
-
-Array = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError
+from driftwalk.schema.trajectory import read_arena
 
 SHAPES = ("circle", "rectangle", "polygon")
 
@@ -25,13 +23,13 @@ class Outline(Protocol):
     def bounds(self) -> tuple[float, float, float, float]:
         """Bounding box (x_min, y_min, x_max, y_max) [m]."""
 
-    def depth(self, x: Array, y: Array) -> Array:
+    def depth(self, x: Floats, y: Floats) -> Floats:
         """Return the distance to the wall [m], negative outside."""
 
-    def normal(self, x: Array, y: Array) -> Array:
+    def normal(self, x: Floats, y: Floats) -> Floats:
         """Return the unit normal into the tank of the wall nearest to each point, shape (n, 2)."""
 
-    def leave(self, x: Array, y: Array, dx: Array, dy: Array) -> tuple[Array, Array]:
+    def leave(self, x: Floats, y: Floats, dx: Floats, dy: Floats) -> tuple[Floats, Floats]:
         """Return where the way from an inside point to an outside point crosses the wall.
 
         Returns
@@ -56,18 +54,18 @@ class Circle:
         (x, y), r = self.center, self.radius
         return x - r, y - r, x + r, y + r
 
-    def depth(self, x: Array, y: Array) -> Array:
+    def depth(self, x: Floats, y: Floats) -> Floats:
         """Return the distance to the wall [m], negative outside."""
         return self.radius - np.hypot(x - self.center[0], y - self.center[1])
 
-    def normal(self, x: Array, y: Array) -> Array:
+    def normal(self, x: Floats, y: Floats) -> Floats:
         """Return the unit normal into the tank; at the very centre, where all are as near, +x."""
         towards = np.column_stack([self.center[0] - x, self.center[1] - y])
         length = np.hypot(towards[:, 0], towards[:, 1])
         towards[length == 0.0] = (1.0, 0.0)
         return np.asarray(towards / np.where(length == 0.0, 1.0, length)[:, None])
 
-    def leave(self, x: Array, y: Array, dx: Array, dy: Array) -> tuple[Array, Array]:
+    def leave(self, x: Floats, y: Floats, dx: Floats, dy: Floats) -> tuple[Floats, Floats]:
         """Return where the way from an inside point to an outside point crosses the wall."""
         px, py = x - self.center[0], y - self.center[1]
         a, b = dx**2 + dy**2, px * dx + py * dy
@@ -88,15 +86,15 @@ class ConvexPolygon:
         (x0, y0), (x1, y1) = np.min(self.corners, axis=0), np.max(self.corners, axis=0)
         return float(x0), float(y0), float(x1), float(y1)
 
-    def depth(self, x: Array, y: Array) -> Array:
+    def depth(self, x: Floats, y: Floats) -> Floats:
         """Return the distance to the nearest wall's line [m], negative outside."""
         return np.asarray(self._distances(x, y).min(axis=0))
 
-    def normal(self, x: Array, y: Array) -> Array:
+    def normal(self, x: Floats, y: Floats) -> Floats:
         """Return the unit normal into the tank of the nearest wall's line."""
         return np.asarray(self._normals()[self._distances(x, y).argmin(axis=0)])
 
-    def leave(self, x: Array, y: Array, dx: Array, dy: Array) -> tuple[Array, Array]:
+    def leave(self, x: Floats, y: Floats, dx: Floats, dy: Floats) -> tuple[Floats, Floats]:
         """Return where the way from an inside point to an outside point crosses the wall."""
         inside, normals = self._distances(x, y), self._normals()
         closing = -(normals @ np.stack([dx, dy]))
@@ -105,13 +103,13 @@ class ConvexPolygon:
         edge = part.argmin(axis=0)
         return np.clip(part.min(axis=0), 0.0, 1.0), normals[edge]
 
-    def _normals(self) -> Array:
+    def _normals(self) -> Floats:
         corners = np.asarray(self.corners)
         along = np.roll(corners, -1, axis=0) - corners
         left = np.column_stack([-along[:, 1], along[:, 0]])
         return np.asarray(left / np.hypot(along[:, 0], along[:, 1])[:, None])
 
-    def _distances(self, x: Array, y: Array) -> Array:
+    def _distances(self, x: Floats, y: Floats) -> Floats:
         """Return how far each point is inside each edge's line, shape (edges, n)."""
         corners, normals = np.asarray(self.corners), self._normals()
         offsets = np.sum(normals * corners, axis=1)
@@ -152,19 +150,6 @@ def outline_of(arena: Mapping[str, Any] | str) -> Outline:
     if shape == "polygon":
         return ConvexPolygon(_convex_corners(facts))
     raise InputError(f"the arena has shape {shape!r}, expected one of {', '.join(SHAPES)}")
-
-
-def read_arena(arena: Mapping[str, Any] | str) -> dict[str, Any]:
-    """Return an arena as a dictionary, from its JSON text or a mapping."""
-    if not isinstance(arena, str):
-        return dict(arena)
-    try:
-        facts = parse_json(arena)
-    except FormatError as error:
-        raise InputError(f"the arena is not JSON text ({error}): got {arena!r}") from error
-    if not isinstance(facts, dict):
-        raise InputError(f"the arena must be an object of keys, got {arena!r}")
-    return facts
 
 
 def _length(facts: Mapping[str, Any], key: str) -> float:

@@ -12,27 +12,19 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.smoothing import local_quadratic
-from driftwalk.flow.arena import Outline, outline_of, read_arena
-from driftwalk.flow.cell_means import (
-    CellMeans,
-    Samples,
-    average_cells,
-    coverage_warnings,
-    flags_of,
-    measured_share,
-)
-from driftwalk.flow.fill import fill_velocity
+from driftwalk.flow.arena import Outline, outline_of
+from driftwalk.flow.cell_means import Samples, average_cells, field_of_cells
 from driftwalk.flow.grid import Grid, make_grid
-from driftwalk.schema import body_names, body_track, build_flow_field, check_trajectory
+from driftwalk.schema import body_names, body_track, check_trajectory
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 Inertia = Literal["corrected", "none"]
 
 ALL_BODIES = "all"
@@ -42,7 +34,7 @@ ALL_BODIES = "all"
 class _Smoothed:
     """Samples with derivatives, and how many had none."""
 
-    position: Array
+    position: Floats
     samples: Samples
     without_derivative: int
 
@@ -141,7 +133,7 @@ def extract_flow(
     outline = outline_of(described)
     grid = make_grid(outline, cells=cells, cell_size=cell_size)
     settings: dict[str, Any] = {"inertia": inertia, "min_count": min_count, "window_s": window}
-    correction: Callable[[Array], Array] = np.zeros_like
+    correction: Callable[[Floats], Floats] = np.zeros_like
     if inertia == "corrected":
         physics = {
             "mass": _required(mass, "mass"),
@@ -167,7 +159,20 @@ def extract_flow(
         arena=json.dumps(described),
         source=str(trajectory.attrs.get("source", "")),
     )
-    return _dataset(grid, outline, means, measured, settings)
+    method = "cell means of a body's velocity, "
+    corrected = "Eq. 4 with the mean acceleration"
+    method += corrected if inertia == "corrected" else "without inertia correction"
+    block = means.velocity.reshape(*grid.shape, 2)
+    return field_of_cells(
+        grid,
+        outline,
+        means,
+        measured,
+        {"method": method, "cell_size_m": grid.cell_size, **settings},
+        u_block=block[..., 0],
+        v_block=block[..., 1],
+        count=means.count.reshape(grid.shape),
+    )
 
 
 def _check_options(inertia: str, min_count: int) -> None:
@@ -255,41 +260,6 @@ def _nothing_measured(smoothed: _Smoothed, inside: Samples, min_count: int, wind
     return f"no cell has {min_count} samples: lower `min_count` or give larger cells (`cells`)"
 
 
-def _dataset(
-    grid: Grid, outline: Outline, means: CellMeans, measured: Mask, settings: dict[str, Any]
-) -> xr.Dataset:
-    flag = flags_of(grid, outline, measured)
-    flow = fill_velocity(grid, means.flow.reshape(*grid.shape, 2), known=measured, outline=outline)
-    error = np.where(measured[..., None], means.standard_error.reshape(*grid.shape, 2), np.nan)
-    block = means.velocity.reshape(*grid.shape, 2)
-    share = measured_share(flag)
-    used, beyond = settings["samples_used"], settings["samples_outside_tank"]
-    warning = " ".join(coverage_warnings(share, used=used, beyond=beyond))
-    attrs = {
-        "method": "cell means of a body's velocity, Eq. 4 with the mean acceleration"
-        if settings["inertia"] == "corrected"
-        else "cell means of a body's velocity, without inertia correction",
-        "cell_size_m": grid.cell_size,
-        **settings,
-        "measured_share": share,
-        "filled_share": 1.0 - share,
-        **({"warning": warning} if warning else {}),
-    }
-    return build_flow_field(
-        grid.x,
-        grid.y,
-        u=flow[..., 0],
-        v=flow[..., 1],
-        flag=flag,
-        attrs=attrs,
-        u_block=block[..., 0],
-        v_block=block[..., 1],
-        count=means.count.reshape(grid.shape),
-        u_standard_error=error[..., 0],
-        v_standard_error=error[..., 1],
-    )
-
-
 def inertia_correction(
     acceleration: npt.ArrayLike,
     *,
@@ -297,7 +267,7 @@ def inertia_correction(
     area: float,
     water_density: float = 1000.0,
     flow_drag_coefficient: float = 1.05,
-) -> Array:
+) -> Floats:
     """Return the velocity of the water relative to the body that it carries.
 
     A body of mass m that accelerates by a feels the force m a. If that force is the quadratic drag

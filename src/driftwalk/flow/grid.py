@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Indices
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.schema import check_flow_field
 
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.intp]
-
 MAX_CELLS = 2000
 """Cells along an axis; four million cells are more than any recording can fill."""
 
@@ -37,9 +35,9 @@ MAX_CELLS = 2000
 class Grid:
     """Square cells of side `cell_size`; node (j, i) is the centre of cell (row j, column i)."""
 
-    x: Array
+    x: Floats
     """Node positions along x [m], shape (nx,)."""
-    y: Array
+    y: Floats
     """Node positions along y [m], shape (ny,)."""
     cell_size: float
     """Side of a cell [m]."""
@@ -54,12 +52,12 @@ class Grid:
         """Number of cells."""
         return self.y.size * self.x.size
 
-    def nodes(self) -> tuple[Array, Array]:
+    def nodes(self) -> tuple[Floats, Floats]:
         """Return the positions of all nodes [m], each of shape (ny, nx)."""
         x, y = np.meshgrid(self.x, self.y)
         return x, y
 
-    def cell_of(self, x: Array, y: Array) -> Indices:
+    def cell_of(self, x: Floats, y: Floats) -> Indices:
         """Return the flat index of each point's cell, -1 off the grid.
 
         A cell holds its lower and left edges; the topmost and rightmost edges belong to the last
@@ -68,7 +66,7 @@ class Grid:
         (column, inside_x), (row, inside_y) = (self._along(x, self.x), self._along(y, self.y))
         return np.where(inside_x & inside_y, row * self.x.size + column, -1)
 
-    def _along(self, position: Array, nodes: Array) -> tuple[Indices, npt.NDArray[np.bool_]]:
+    def _along(self, position: Floats, nodes: Floats) -> tuple[Indices, npt.NDArray[np.bool_]]:
         cells = (position - nodes[0]) / self.cell_size + 0.5
         # An edge that rounding has moved by a hair still belongs to the grid.
         inside = (cells >= -1e-9) & (cells <= nodes.size + 1e-9)
@@ -121,7 +119,7 @@ def make_grid(outline: Outline, *, cells: int = 50, cell_size: float | None = No
     return Grid(_centres(x_min, x_max, size), _centres(y_min, y_max, size), size)
 
 
-def _centres(low: float, high: float, size: float) -> Array:
+def _centres(low: float, high: float, size: float) -> Floats:
     # 1e-9: a side that is a whole number of cells does not get one more from rounding.
     count = max(2, math.ceil((high - low) / size - 1e-9))
     middle = (low + high) / 2.0
@@ -129,7 +127,7 @@ def _centres(low: float, high: float, size: float) -> Array:
     return round_nodes(middle + steps * size)
 
 
-def round_nodes(nodes: Array) -> Array:
+def round_nodes(nodes: Floats) -> Floats:
     """Return nodes without the last digits, which depend on how they were computed.
 
     xarray lines up two fields by comparing their nodes exactly, and -0.147 is to be -0.147 whether
@@ -141,7 +139,7 @@ def round_nodes(nodes: Array) -> Array:
 
 def bilinear(
     flow: xr.Dataset, x: npt.ArrayLike, y: npt.ArrayLike, *, time: float | None = None
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Return the velocity of the water at given positions.
 
     Bilinear between the four nodes around a place; beyond the outermost nodes the nearest value on
@@ -190,7 +188,7 @@ def bilinear(
     return u, v
 
 
-def _bracket(nodes: Array, at: Array) -> tuple[Indices, Array]:
+def _bracket(nodes: Floats, at: Floats) -> tuple[Indices, Floats]:
     """Return the node to the left of each place and how far on it is, clamped to the nodes."""
     # Uniform spacing, so division instead of a search.
     spacing = (nodes[-1] - nodes[0]) / (nodes.size - 1)
@@ -199,7 +197,7 @@ def _bracket(nodes: Array, at: Array) -> tuple[Indices, Array]:
     return left, position - left
 
 
-def _frame(flow: xr.Dataset, name: str, time: float | None) -> Array:
+def _frame(flow: xr.Dataset, name: str, time: float | None) -> Floats:
     """Return a component at a time, shape (ny, nx)."""
     values = np.asarray(flow[name].values, dtype=np.float64)
     if "time" not in flow[name].dims:
@@ -271,13 +269,13 @@ class FieldRows:
 
     line: Indices
     """Line of the file, from 1, shape (n,)."""
-    x: Array
+    x: Floats
     """Position x, shape (n,)."""
-    y: Array
+    y: Floats
     """Position y, shape (n,)."""
-    u: Array
+    u: Floats
     """Velocity along x, shape (n,)."""
-    v: Array
+    v: Floats
     """Velocity along y, shape (n,)."""
 
 
@@ -285,11 +283,11 @@ class FieldRows:
 class GriddedField:
     """A velocity field on a regular grid."""
 
-    x: Array
+    x: Floats
     """Nodes along x, shape (nx,)."""
-    y: Array
+    y: Floats
     """Nodes along y, shape (ny,)."""
-    velocity: Array
+    velocity: Floats
     """Velocities, shape (ny, nx, 2)."""
 
 
@@ -319,7 +317,7 @@ def grid_rows(rows: FieldRows) -> GriddedField:
     return GriddedField(x, y, velocity)
 
 
-def _axis(name: str, values: Array, line: Indices) -> tuple[Array, Indices]:
+def _axis(name: str, values: Floats, line: Indices) -> tuple[Floats, Indices]:
     """Return the nodes along an axis and the number of each row's node."""
     order = np.argsort(values, kind="stable")
     width = float(np.ptp(values))

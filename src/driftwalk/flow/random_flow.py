@@ -8,18 +8,18 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.flow.analytic import TANK_30_CM, flow_from_function
-from driftwalk.flow.arena import Outline, outline_of, read_arena
+from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import make_grid
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
-Velocity = Callable[[Array, Array], tuple[Array, Array]]
+Velocity = Callable[[Floats, Floats], tuple[Floats, Floats]]
 Family = Literal["swirl", "eddies"]
 
 
@@ -118,7 +118,7 @@ def _swirl(generator: np.random.Generator, outline: Outline) -> Velocity:
         width = generator.uniform(0.02, 0.04) / 0.15
         jets.append((at, heading, width, generator.uniform(0.03, 0.08)))
 
-    def velocity(x: Array, y: Array) -> tuple[Array, Array]:
+    def velocity(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         # In radii of the tank; rates are per second and of a tank of 15 cm.
         east, north = (x - center_x) / radius, (y - center_y) / radius
         fading = 0.15 * rotation * np.exp(-((np.hypot(east, north) * 0.15 / 0.14) ** 4))
@@ -141,7 +141,7 @@ def _eddies(generator: np.random.Generator, outline: Outline) -> Velocity:
     phases = generator.uniform(0.0, 2.0 * math.pi, _RANDOM_FLOW.waves)
     typical, sink = generator.uniform(0.04, 0.07), generator.uniform(0.1, 0.3)
 
-    def stirred(x: Array, y: Array) -> tuple[Array, Array]:
+    def stirred(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Return the curl of the stream function; it is a sum of cosines."""
         east, north = (x - center_x) / radius, (y - center_y) / radius
         u, v = np.zeros_like(east), np.zeros_like(east)
@@ -152,7 +152,7 @@ def _eddies(generator: np.random.Generator, outline: Outline) -> Velocity:
 
     scaled = _scaled(stirred, typical / _rms_speed(stirred, outline))
 
-    def velocity(x: Array, y: Array) -> tuple[Array, Array]:
+    def velocity(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         u, v = scaled(x, y)
         inflow = 0.15 * sink / radius
         return u - inflow * (x - center_x), v - inflow * (y - center_y)
@@ -161,7 +161,7 @@ def _eddies(generator: np.random.Generator, outline: Outline) -> Velocity:
 
 
 def _scaled(velocity: Velocity, factor: float) -> Velocity:
-    def scaled(x: Array, y: Array) -> tuple[Array, Array]:
+    def scaled(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         u, v = velocity(x, y)
         return factor * u, factor * v
 

@@ -9,28 +9,170 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats, Indices
 from driftwalk.core.errors import InputError
-from driftwalk.flow.arena import Outline, outline_of, read_arena
-from driftwalk.flow.cell_means import (
-    CellMeans,
-    Samples,
-    average_cells,
-    coverage_warnings,
-    flags_of,
-    measured_share,
-)
-from driftwalk.flow.fill import fill_velocity
+from driftwalk.flow.arena import Outline, outline_of
+from driftwalk.flow.cell_means import CellMeans, Samples, average_cells, field_of_cells
 from driftwalk.flow.grid import Grid, make_grid
-from driftwalk.flow.track_steps import Steps, step_noise, track_steps
-from driftwalk.schema import build_flow_field, check_trajectory
+from driftwalk.schema import check_trajectory
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Steps of many bodies, in order of body and time; n of them."""
+
+    body: Indices
+    """Number of the body, shape (n,)."""
+    first: Indices
+    """Number of the sample at which the step begins, shape (n,): in a row, one more each."""
+    time: Floats
+    """Middle of the step in time [s], shape (n,)."""
+    interval: Floats
+    """Duration [s], shape (n,)."""
+    position: Floats
+    """Middle of the step [m], shape (n, 2)."""
+    velocity: Floats
+    """Velocity [m/s], shape (n, 2)."""
+
+    def select(self, chosen: Bools) -> Steps:
+        """Return some of the steps."""
+        return Steps(
+            self.body[chosen],
+            self.first[chosen],
+            self.time[chosen],
+            self.interval[chosen],
+            self.position[chosen],
+            self.velocity[chosen],
+        )
+
+    @property
+    def goes_on(self) -> Bools:
+        """Whether each step but the last ends where the next one begins, shape (n - 1,)."""
+        same = self.body[1:] == self.body[:-1]
+        return np.asarray(same & (np.diff(self.first) == 1))
+
+
+@dataclass(frozen=True)
+class FoundSteps:
+    """The steps of a recording, and how many pairs of samples are none."""
+
+    steps: Steps
+    across_gaps: int
+    """Pairs of samples with a gap between."""
+    ambiguous: int
+    """Pairs between which the tracker could have exchanged identities."""
+
+
+def track_steps(trajectory: xr.Dataset) -> FoundSteps:
+    """Return the steps of all bodies of a recording.
+
+    An interval longer than 1.5 times the median one of all tracks is a gap, as for
+    `local_quadratic`. Where the tracker says that identities could have been exchanged
+    (``ambiguous``), there is no step.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A `trajectory`.
+
+    Raises
+    ------
+    InputError
+        When there is no step.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> two = build_trajectory([0.0, 1.0, 2.0], [[0, 5], [1, 5], [2, np.nan]], np.zeros((3, 2)))
+    >>> track_steps(two).steps.velocity[:, 0].tolist()
+    [1.0, 1.0, 0.0]
+    """
+    x, y = (trajectory[name].values.T for name in ("x", "y"))
+    body, row = np.nonzero(np.isfinite(x) & np.isfinite(y))
+    time, position = trajectory["time"].values[row], np.column_stack([x[body, row], y[body, row]])
+    first = np.flatnonzero(body[1:] == body[:-1])
+    if first.size == 0:
+        raise InputError(
+            "no body has two positions, and a velocity needs two: is each row a separate body? "
+            "Name the column of the identities with `columns`"
+        )
+    interval = np.diff(time)[first]
+    near = interval <= 1.5 * float(np.median(interval))
+    sure = np.ones(first.size, dtype=bool)
+    if "ambiguous" in trajectory:
+        unsure = (trajectory["ambiguous"].values.T > 0.0)[body, row]
+        sure = ~(unsure[first] | unsure[first + 1])
+    steps = Steps(
+        body[first],
+        first,
+        0.5 * (time[first] + time[first + 1]),
+        interval,
+        0.5 * (position[first] + position[first + 1]),
+        (position[first + 1] - position[first]) / interval[:, None],
+    )
+    return FoundSteps(
+        steps.select(near & sure),
+        across_gaps=int(np.count_nonzero(~near)),
+        ambiguous=int(np.count_nonzero(near & ~sure)),
+    )
+
+
+def step_noise(steps: Steps) -> float:
+    """Estimate the position noise of many tracks, too short for an estimate each.
+
+    The fourth divided difference of five positions in a row, at their own times, holds next to
+    nothing of a smooth path. Scaled to weights whose squares add up to one, it has the variance r²
+    of white noise r per axis. The median size says r, and false links hardly change it.
+
+    Parameters
+    ----------
+    steps : Steps
+        Steps as `track_steps` returns them.
+
+    Returns
+    -------
+    float
+        Standard deviation per axis [m]; NaN where there are too few samples in a row.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 5, 1000))
+    >>> x = 0.01 * np.arange(5)[:, None] + noise[0]
+    >>> r = step_noise(track_steps(build_trajectory(np.arange(5) * 0.1, x, noise[1])).steps)
+    >>> round(r, 4)
+    0.0003
+    """
+    if steps.time.size < 4:
+        return math.nan
+    in_a_row = np.lib.stride_tricks.sliding_window_view(steps.goes_on, 3).all(axis=1)
+    # With fewer fourth differences the noise is not known.
+    if np.count_nonzero(in_a_row) < 50:
+        return math.nan
+    window = np.flatnonzero(in_a_row)[:, None] + np.arange(4)
+    interval = steps.interval[window]
+    time = _from_zero(interval)
+    position = _from_zero(steps.velocity[window] * interval[..., None])
+    # A sample's distance to itself is no factor.
+    apart = time[:, :, None] - time[:, None, :] + np.eye(time.shape[1])
+    weight = 1.0 / apart.prod(axis=2)
+    weight /= np.sqrt(np.sum(weight**2, axis=1, keepdims=True))
+    return 1.4826 * float(np.median(np.abs(np.einsum("nk,nki->ni", weight, position))))
+
+
+def _from_zero(changes: Floats) -> Floats:
+    """Return the sums of changes along axis 1, with a zero in front."""
+    return np.concatenate([np.zeros_like(changes[:, :1]), np.cumsum(changes, axis=1)], axis=1)
 
 
 class LinkPolicy(NamedTuple):
@@ -56,10 +198,10 @@ _CHUNK: Final = 1 << 14
 class Judged(NamedTuple):
     """The verdict of the test on every step."""
 
-    deviation: Array
+    deviation: Floats
     """Normalised deviation, shape (n,); NaN where a step is not judged."""
 
-    def is_false(self, threshold: float) -> Mask:
+    def is_false(self, threshold: float) -> Bools:
         """Return which steps are false links."""
         return np.asarray(self.deviation > threshold)
 
@@ -90,7 +232,7 @@ def judge_steps(steps: Steps, *, noise: float) -> Judged:
 
     Examples
     --------
-    >>> from driftwalk.flow.track_steps import track_steps
+    >>> from driftwalk.flow.tracers import track_steps
     >>> from driftwalk.schema import build_trajectory
     >>> x = np.arange(5.0)[:, None] + np.linspace(0.0, 1.0, 20)
     >>> x[3:, 7] += 9.0
@@ -108,7 +250,7 @@ def judge_steps(steps: Steps, *, noise: float) -> Judged:
     return Judged(deviation)
 
 
-def _from_own(steps: Steps) -> Array:
+def _from_own(steps: Steps) -> Floats:
     """Return how far a velocity is from the nearer one of its neighbours in time, inf without."""
     apart = np.full(steps.time.size, np.inf)
     at = np.flatnonzero(steps.goes_on)
@@ -118,7 +260,7 @@ def _from_own(steps: Steps) -> Array:
     return apart
 
 
-def _neighbourhood(steps: Steps) -> tuple[Array, Array]:
+def _neighbourhood(steps: Steps) -> tuple[Floats, Floats]:
     """Return the median velocity of the neighbours and the median distance from it."""
     from scipy.spatial import cKDTree
 
@@ -143,7 +285,7 @@ def _neighbourhood(steps: Steps) -> tuple[Array, Array]:
     return middle, spread
 
 
-def _medians(velocity: Array, near: npt.NDArray[np.intp], other: Mask) -> tuple[Array, Array]:
+def _medians(velocity: Floats, near: npt.NDArray[np.intp], other: Bools) -> tuple[Floats, Floats]:
     """Return both medians over the nearest steps of other tracks."""
     first = np.argsort(~other, axis=1, kind="stable")[:, : LINKS.neighbours]
     there = np.take_along_axis(other, first, axis=1)
@@ -156,12 +298,8 @@ def _medians(velocity: Array, near: npt.NDArray[np.intp], other: Mask) -> tuple[
     return middle, np.nanmedian(_length(around - middle[:, None]), axis=1)
 
 
-def _length(vectors: Array) -> Array:
+def _length(vectors: Floats) -> Floats:
     return np.hypot(vectors[..., 0], vectors[..., 1])
-
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 
 class TracerPolicy(NamedTuple):
@@ -281,7 +419,16 @@ def flow_from_tracers(
         "source": str(trajectory.attrs.get("source", "")),
         **({} if tank is None else {"arena": json.dumps(tank)}),
     }
-    return _dataset(grid, outline, means, measured, settings, _doubts(kept, grid, means, settings))
+    return field_of_cells(
+        grid,
+        outline,
+        means,
+        measured,
+        settings,
+        doubts=_doubts(kept, grid, means, settings),
+        count=means.count.reshape(grid.shape),
+        tracks=means.visits.reshape(grid.shape),
+    )
 
 
 def _check_options(min_count: int, outlier_threshold: float, noise: float | None) -> None:
@@ -358,38 +505,3 @@ def _doubts(steps: Steps, grid: Grid, means: CellMeans, settings: Mapping[str, A
     if not (means.visits > 1).any():
         sentences.append("No cell has two tracks: there are no standard errors; use larger cells.")
     return sentences
-
-
-def _dataset(
-    grid: Grid,
-    outline: Outline | None,
-    means: CellMeans,
-    measured: Mask,
-    settings: Mapping[str, Any],
-    doubts: list[str],
-) -> xr.Dataset:
-    flag = flags_of(grid, outline, measured)
-    share = measured_share(flag)
-    used, beyond = settings["samples_used"], settings["samples_outside_tank"]
-    cells = "the cells" if outline is None else "the tank's cells"
-    coverage = coverage_warnings(share, used=used, beyond=beyond, cells=cells)
-    warning = " ".join([*coverage, *doubts])
-    flow = fill_velocity(grid, means.flow.reshape(*grid.shape, 2), known=measured, outline=outline)
-    error = np.where(measured[..., None], means.standard_error.reshape(*grid.shape, 2), np.nan)
-    return build_flow_field(
-        grid.x,
-        grid.y,
-        u=flow[..., 0],
-        v=flow[..., 1],
-        flag=flag,
-        attrs={
-            **settings,
-            "measured_share": share,
-            "filled_share": 1.0 - share,
-            **({"warning": warning} if warning else {}),
-        },
-        count=means.count.reshape(grid.shape),
-        tracks=means.visits.reshape(grid.shape),
-        u_standard_error=error[..., 0],
-        v_standard_error=error[..., 1],
-    )

@@ -13,15 +13,14 @@ from driftwalk.conditions import one_body_each, require_travel
 from driftwalk.conditions.refuse import prefix_of
 from driftwalk.conditions.study import fitted_law, is_fitted
 from driftwalk.core.errors import InputError, argument_text
-from driftwalk.core.text.json_text import parse_json
-from driftwalk.flow.arena import outline_of, read_arena
+from driftwalk.core.text_files import parse_json
+from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.parameters import Point, body_of
 from driftwalk.likelihood.filter.series import (
     FILTER,
     ORIENTED_SHARE,
     Series,
-    body_of,
     series_of,
     stretches_unsettled,
     usable_intervals,
@@ -53,6 +52,7 @@ from driftwalk.likelihood.tracker_errors.smoothed import require_raw
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.tracker_errors import without_outliers
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr

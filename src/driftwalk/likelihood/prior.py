@@ -23,7 +23,7 @@ from driftwalk.likelihood.measured_flow import MeasuredFlow
 from driftwalk.likelihood.spline import penalties
 
 if TYPE_CHECKING:
-    from driftwalk.model.bodies import RigidBody
+    from driftwalk.model.rigid_bodies import RigidBody
 
 
 class PriorPolicy(NamedTuple):

@@ -23,17 +23,17 @@ from driftwalk.core.random_streams import RecoveryStream
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.units import in_percent
 from driftwalk.flow import random_tank_flow
-from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.refuse import LIMIT
 from driftwalk.likelihood.score import NEEDED_CONFIDENCE, SCORED, add_summary, score_fit
 from driftwalk.model import Study, apply_overrides
 from driftwalk.model.recover import RANDOM, true_time_step_s
-from driftwalk.schema import FLAGS, build_trajectory, check_flow_field
+from driftwalk.schema import build_trajectory, check_flow_field
 from driftwalk.schema.check import described
 from driftwalk.schema.kinds import KINDS
 from driftwalk.schema.kinds.recovery import ESTIMATED, RECOVERED
 from driftwalk.simulation import simulate
+from driftwalk.simulation.backend import require_cover
 from driftwalk.sweep import Design, Store, grid
 from driftwalk.sweep.workers import single_threaded_processes
 
@@ -94,25 +94,7 @@ def require_flow(study: Study, flow: xr.Dataset | None) -> None:
     check_flow_field(flow)
     if "time" in flow.dims:
         raise InputError("the true flow has frames: a recovery study needs a steady one")
-    outline, tank = outline_of(study.tank.to_arena()), study.tank.describe()
-    low_x, low_y, high_x, high_y = outline.bounds
-    x, y = flow["x"].values, flow["y"].values
-    cell = float(x[1] - x[0]), float(y[1] - y[0])
-    for nodes, size, low, high in ((x, cell[0], low_x, high_x), (y, cell[1], low_y, high_y)):
-        if nodes[0] - size > low + 1e-9 or nodes[-1] + size < high - 1e-9:
-            raise InputError(
-                f"the flow field does not cover the tank, a {tank}: it spans x from {x[0]:.4g} to "
-                f"{x[-1]:.4g} m, y from {y[0]:.4g} to {y[-1]:.4g} m; give the field of this tank, "
-                "or the tank of this field ([tank])"
-            )
-    depth = outline.depth(*(part.ravel() for part in np.meshgrid(x, y)))
-    inner = (depth > math.hypot(*cell)).reshape(y.size, x.size)
-    lacking = int(np.count_nonzero(inner & (flow["flag"].values == FLAGS["outside"])))
-    if lacking:
-        raise InputError(
-            f"the flow field does not cover the tank, a {tank}: {lacking} of its nodes in there "
-            "are flagged as outside of the tank that it was made for; give the field of this tank"
-        )
+    require_cover(flow, study.tank)
 
 
 PARTS: Final = ("", "_low", "_high", "_sd", "_error", "_z", "_covered")

@@ -15,14 +15,12 @@ from driftwalk.model.study import (
     apply_overrides,
     declared,
     load_study,
-    parse_study,
-)
-from driftwalk.model.tank import FieldOfView, Tank, Water
-from driftwalk.model.template import (
     parameter_table,
+    parse_study,
     short_study_template,
     study_template,
 )
+from driftwalk.model.tank import FieldOfView, Tank, Water
 
 __all__ = [
     "Assembly",

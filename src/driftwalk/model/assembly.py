@@ -124,7 +124,7 @@ class Assembly(Section):
     @classmethod
     def _glued_shape(cls, value: str) -> str:
         if value != "x":
-            from driftwalk.model.bodies import Measures, rigid_body
+            from driftwalk.model.rigid_bodies import Measures, rigid_body
 
             if not set(value) <= set("x./"):
                 raise ConfigurationError(

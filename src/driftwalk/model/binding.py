@@ -14,8 +14,7 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 from pydantic import model_validator
 
 from driftwalk.core.errors import ConfigurationError, FormatError, did_you_mean
-from driftwalk.core.files.bounded import read_bounded
-from driftwalk.core.text.toml_text import MOST_BYTES, parse_toml
+from driftwalk.core.text_files import MOST_TOML_BYTES, parse_toml, read_bounded
 from driftwalk.model.section import Quantity, Section
 
 MOST: Final = 32
@@ -231,7 +230,7 @@ def read_binding(path: str | Path) -> Binding:
     >>> read_binding("rules.toml").blocks  # doctest: +SKIP
     4
     """
-    text = read_bounded(path, most=MOST_BYTES)
+    text = read_bounded(path, most=MOST_TOML_BYTES)
     try:
         return Binding(**parse_toml(text))
     except FormatError as error:

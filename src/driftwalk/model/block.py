@@ -13,7 +13,7 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.section import OrNumber, Placeholder, Quantity, Section
 
 if TYPE_CHECKING:
-    from driftwalk.model.bodies import RigidBody
+    from driftwalk.model.rigid_bodies import RigidBody
 
 
 class BodySize(TypedDict):
@@ -125,7 +125,7 @@ class Block(Section):
 
     def body(self, hidden_share: float = 0.0) -> RigidBody:
         """Return the outline of the body; of glued blocks with a share of hidden drag, 0 to 1."""
-        from driftwalk.model.bodies import Measures, rigid_body
+        from driftwalk.model.rigid_bodies import Measures, rigid_body
 
         return rigid_body(
             self.shape, Measures(self.side_m, self.width_m, self.strips_per_face, hidden_share)

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Final, Literal, TypeVar
+from typing import Annotated, ClassVar, Final, Literal
 
 from pydantic import Field, field_validator
 
 from driftwalk.core.errors import ConfigurationError, did_you_mean
 from driftwalk.model.fit import Fit
-from driftwalk.model.section import Placeholder, Quantity, Section, Seed, quoted, words_of
+from driftwalk.model.section import Placeholder, Quantity, Section, Seed, distinct, quoted, words_of
 
 LARGEST_STEP_S: Final = 0.0025
 """Largest time step of a simulation that is taken for the truth: its error is then far below what
 a recording can tell."""
 RANDOM: Final = "random"
-
-Item = TypeVar("Item", float, str)
 
 
 class Recover(Section):
@@ -72,7 +70,7 @@ class Recover(Section):
     @field_validator("durations_s")
     @classmethod
     def _durations(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(sorted(_distinct(values)))
+        return tuple(sorted(distinct(values)))
 
     @field_validator("angle")
     @classmethod
@@ -80,20 +78,12 @@ class Recover(Section):
         if values is None:
             return None
         known = words_of(Fit, "angle")
-        for word in _distinct(values):
+        for word in distinct(values):
             if word not in known:
                 raise ConfigurationError(
                     f"must be a list of {quoted(known)}, got {word!r}{did_you_mean(word, known)}"
                 )
         return values
-
-
-def _distinct(values: tuple[Item, ...]) -> tuple[Item, ...]:
-    if not values:
-        raise ConfigurationError("the list is empty; leave the key out or name a value")
-    if len(set(values)) < len(values):
-        raise ConfigurationError(f"the list names a value twice: {list(values)}")
-    return values
 
 
 def true_time_step_s(time_step_s: float | Literal["auto"], *, force_interval_s: float) -> float:

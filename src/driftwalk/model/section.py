@@ -17,13 +17,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Final, get_args
+from typing import Annotated, Any, ClassVar, Final, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
 
 from driftwalk.core.errors import ConfigurationError, did_you_mean
 from driftwalk.core.units import parse_quantity
+
+Item = TypeVar("Item")
 
 SMALLEST: Final = 1e-25
 """Least value, in SI, of a number that must be more than 0: below every length, mass, time and
@@ -226,6 +228,15 @@ def _texts_of(module: str) -> dict[tuple[str, str], str]:
         and isinstance(text.value, ast.Constant)
         and isinstance(text.value.value, str)
     }
+
+
+def distinct(values: tuple[Item, ...]) -> tuple[Item, ...]:
+    """Return the values of a list; refuse an empty one, and one that names a value twice."""
+    if not values:
+        raise ConfigurationError("the list is empty; leave the key out or name a value")
+    if len(set(values)) < len(values):
+        raise ConfigurationError(f"the list names a value twice: {list(values)}")
+    return values
 
 
 def quoted(words: Iterable[str]) -> str:

@@ -14,7 +14,7 @@ from driftwalk.model.binding import faces_text
 from driftwalk.model.block import DragCoefficient, ForceStd
 from driftwalk.model.calibration import ForceGrid
 from driftwalk.model.interaction import MagnetText, parse_magnet
-from driftwalk.model.section import Quantity, Seed
+from driftwalk.model.section import Quantity, Seed, distinct
 
 AXES: Final[dict[str, str]] = {
     "tank_diameter": "tank_diameter_m",
@@ -114,11 +114,7 @@ class Sensitivity(ForceGrid):
     @field_validator(*LISTS)
     @classmethod
     def _distinct(cls, values: tuple[Any, ...] | None) -> tuple[Any, ...] | None:
-        if values is not None and not values:
-            raise ConfigurationError("the list is empty; leave the key out or name a value")
-        if values is not None and len(set(values)) < len(values):
-            raise ConfigurationError(f"the list names a value twice: {list(values)}")
-        return values
+        return None if values is None else distinct(values)
 
     @field_validator("magnets")
     @classmethod

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import Field, ModelWrapValidatorHandler, field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError, FormatError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.model.section import Quantity, Section
 
 Vertices = tuple[tuple[float, float], ...]

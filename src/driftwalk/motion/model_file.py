@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError, did_you_mean
 from driftwalk.core.extras import show_dask
@@ -20,9 +20,6 @@ from driftwalk.motion.function import Settings, function_model
 from driftwalk.motion.protocol import MotionModel, ScoresItself
 from driftwalk.motion.ranges import Range
 from driftwalk.schema import Parameter
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

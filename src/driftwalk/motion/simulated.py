@@ -14,7 +14,6 @@ from driftwalk.conditions.recorded import Conditions, neighbours_of, recorded_co
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
-from driftwalk.core.random_streams import world_keys
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.external_program.program import ProgramModel
 from driftwalk.motion.family import ParticleModel
@@ -25,7 +24,7 @@ from driftwalk.schema import body_track
 from driftwalk.schema.check import build_dataset
 from driftwalk.simulation.backend import STATUS, check_sample_time
 from driftwalk.simulation.initial import Start, random_place, random_start
-from driftwalk.simulation.run import default_times, plain_camera
+from driftwalk.simulation.run import default_times, plain_camera, replicate_keys
 from driftwalk.simulation.series import continued_flow, flow_starts, series_facts, velocity_at
 
 if TYPE_CHECKING:
@@ -102,12 +101,7 @@ def simulate_motion(
     """
     values = known_values(model, parameters)
     _check_flow(model, flow)
-    settings = study.simulation
-    count = settings.replicates if replicates is None else replicates
-    if count < 1:
-        raise InputError(f"replicates must be at least 1, got {count}")
-    chosen = settings.seed if seed is None else seed
-    keys = world_keys(chosen, trial=0, replicate=np.arange(count))
+    chosen, keys = replicate_keys(study, replicates, seed)
     if like is None:
         if body is not None:
             raise InputError("`body` names a body of the recording `like`, and none is given")
@@ -127,7 +121,7 @@ def simulate_motion(
             neighbours=neighbours_of(like, body, study.tank),
             threads=threads,
         )
-    columns = {name: np.full(count, value) for name, value in values.items()}
+    columns = {name: np.full(keys.size, value) for name, value in values.items()}
     worlds = model.simulate(columns, conditions, keys)
     if (worlds.status & STATUS["non_finite"]).all():
         raise InputError(no_numbers(model.name, values))

@@ -15,7 +15,7 @@ from driftwalk.notebook.simulating import model_of
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.assembly.outcome_posterior.observed import Outcomes
+    from driftwalk.assembly.outcome_posterior.records import Outcomes
     from driftwalk.model import Study
     from driftwalk.runs import Progress
 

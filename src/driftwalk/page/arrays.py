@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.json_text import json_value
+from driftwalk.core.text_files import json_value
 
 SHORT: Final = 64
 """Arrays with fewer numbers than this stand as a plain list where their reader allows it."""

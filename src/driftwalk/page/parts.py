@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError, InputError
-from driftwalk.core.text.json_text import json_value
+from driftwalk.core.text_files import json_value
 from driftwalk.core.units import RAISED, percent, raised_powers
 from driftwalk.page.arrays import number, numbers
 from driftwalk.plot.parts.arena import arena_of

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.core.text.json_text import json_value
+from driftwalk.core.text_files import json_value
 from driftwalk.page import parts
 from driftwalk.page.html import page_frame
 from driftwalk.page.parts import Section, is_simulated

@@ -11,24 +11,22 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.units import percent
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import (
+from driftwalk.plot.parts.labels import number_fact
+from driftwalk.plot.parts.outcome_classes import (
+    NAME_SIZE_PT,
     OTHER,
+    are_discs,
     check_kind,
+    class_cells,
     class_colors,
     class_names,
     classes_to_show,
     is_complete,
-    runs_text,
-    with_rest,
-)
-from driftwalk.plot.parts.labels import number_fact
-from driftwalk.plot.parts.polyomino_sketch import (
-    NAME_SIZE_PT,
-    are_discs,
-    class_cells,
     name_text,
     place_sketch,
+    runs_text,
     sketch_size,
+    with_rest,
 )
 
 if TYPE_CHECKING:

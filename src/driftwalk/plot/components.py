@@ -9,12 +9,13 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind, class_names
-from driftwalk.plot.parts.polyomino_sketch import (
+from driftwalk.plot.parts.outcome_classes import (
     LETTER_PT,
     NAME_SIZE_PT,
     are_discs,
+    check_kind,
     class_cells,
+    class_names,
     is_class,
     name_text,
     sketch_box,

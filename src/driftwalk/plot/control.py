@@ -9,7 +9,7 @@ import numpy as np
 from driftwalk.core.units import percent
 from driftwalk.plot.assembly_courses import TIME_LABEL
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind
+from driftwalk.plot.parts.outcome_classes import check_kind
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:

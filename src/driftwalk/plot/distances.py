@@ -8,12 +8,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.labels import (
-    interval_of,
-    number_fact,
-    plane_of,
-    require_variables,
-)
+from driftwalk.plot.parts.labels import interval_of, number_fact, plane_of, require_variables
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -22,7 +22,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import atomic_path, require_target
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, draw_scale_bar
-from driftwalk.plot.parts.polyomino_sketch import empty_bars, pole_bars, poles_of
+from driftwalk.plot.parts.outcome_classes import empty_bars, pole_bars, poles_of
 from driftwalk.plot.parts.style import PALETTE
 from driftwalk.schema.check import kind_name
 

@@ -10,10 +10,12 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.units import percent
 from driftwalk.plot.assembly_courses import TIME_LABEL, label_right
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind, class_colors, class_names
-from driftwalk.plot.parts.polyomino_sketch import (
+from driftwalk.plot.parts.outcome_classes import (
     are_discs,
+    check_kind,
     class_cells,
+    class_colors,
+    class_names,
     name_text,
     place_sketch,
     sketch_size,

@@ -10,16 +10,17 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.units import percent
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import (
+from driftwalk.plot.parts.outcome_classes import (
     OTHER,
     check_kind,
     class_names,
     classes_to_show,
+    draw_sketches_below,
     is_complete,
+    names_fit,
     runs_text,
     with_rest,
 )
-from driftwalk.plot.parts.polyomino_sketch import draw_sketches_below, names_fit
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,8 +9,8 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.units import percent
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind
 from driftwalk.plot.parts.labels import number_label, set_symbols
+from driftwalk.plot.parts.outcome_classes import check_kind
 from driftwalk.schema.answers.outcome_posterior import condition, number_of
 from driftwalk.schema.answers.parts import each
 

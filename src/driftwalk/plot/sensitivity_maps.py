@@ -11,26 +11,24 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.distances import cell_edges, hatch_cell
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import (
-    SweepAxis,
-    check_kind,
-    class_names,
-    classes_to_show,
-    reference_value,
-    sweep_axes,
-)
 from driftwalk.plot.parts.labels import number_fact
-from driftwalk.plot.parts.polyomino_sketch import (
+from driftwalk.plot.parts.outcome_classes import (
     LETTER_PT,
     MAX_CELL_PT,
     NAME_GAP_PT,
     NAME_SIZE_PT,
+    SweepAxis,
     are_discs,
+    check_kind,
     class_cells,
+    class_names,
+    classes_to_show,
     is_class,
     name_text,
     place_sketch,
+    reference_value,
     sketch_size,
+    sweep_axes,
 )
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from driftwalk.plot.parts.arena import (
     draw_scale_bar,
     label_position,
 )
-from driftwalk.plot.parts.polyomino_sketch import empty_bars, pole_bars, poles_of
+from driftwalk.plot.parts.outcome_classes import empty_bars, pole_bars, poles_of
 from driftwalk.plot.parts.style import PALETTE
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.check import kind_name

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from driftwalk.plot.assembly_courses import TIME_LABEL
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind
 from driftwalk.plot.parts.labels import set_symbols
+from driftwalk.plot.parts.outcome_classes import check_kind
 from driftwalk.schema.answers.yields import point_words, varied
 from driftwalk.schema.shapes import short_class
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Bools
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.json_text import json_value, parse_json
+from driftwalk.core.text_files import json_value, parse_json
 from driftwalk.record.arena import fit_circle
 from driftwalk.record.raw import Array
 from driftwalk.schema import Track, body_names, body_track, check_trajectory

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError, listed
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.core.units import parse_quantity
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
 from driftwalk.record.cleaning.clean import Counts, clean_body

@@ -21,7 +21,7 @@ from typing import Any, Final, Protocol, runtime_checkable
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError, naming_its_file, reason_of
-from driftwalk.core.files.bounded import text_of_name
+from driftwalk.core.text_files import text_of_name
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.containers import ZIP, members, names_in
 from driftwalk.record.raw import (

@@ -5,11 +5,9 @@ from driftwalk.runs.calibration import CalibrationWork, ModelComparisonWork
 from driftwalk.runs.control import ControlPlanWork, ControlTestWork
 from driftwalk.runs.finished_run import FoundRun, flow_of_result, read_found, run_folder
 from driftwalk.runs.fit import Fitted, FitWork, read_earlier_fit
-from driftwalk.runs.kinetics import KineticsWork
-from driftwalk.runs.outcome_posterior import OutcomePosteriorWork
+from driftwalk.runs.outcomes import KineticsWork, OutcomePosteriorWork, YieldWork
 from driftwalk.runs.recovery import RecoveryWork
 from driftwalk.runs.resumable_run import Progress, Run, Work, run_work
-from driftwalk.runs.yields import YieldWork
 from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 __all__ = [

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.schema.description import Attribute, Kind, Variable
 from driftwalk.schema.kinds import KINDS, find_kind
 
@@ -179,24 +179,6 @@ def build_dataset(
 
     known = {"kind": kind, "schema_version": KINDS[kind].version}
     return described(xr.Dataset(data, coords, {**known, **attrs, **known}))
-
-
-def unknown_names(dataset: xr.Dataset) -> list[str]:
-    """Return the variables, dimensions and attributes that its kind does not name."""
-    kind = kind_of_dataset(dataset)
-    variables = {one.name: one for one in kind.variables}
-    free = {
-        str(dim)
-        for name, one in dataset.variables.items()
-        if name in variables and variables[str(name)].dims.startswith("...")
-        for dim in one.dims
-    }
-    known = {one.name for one in kind.attributes} | {"kind", "schema_version"}
-    return [
-        *(f"variable {name}" for name in dataset.variables if name not in {*variables, *free}),
-        *(f"dimension {name}" for name in dataset.dims if name not in {*kind.dimensions, *free}),
-        *(f"attribute {name}" for name in dataset.attrs if name not in known),
-    ]
 
 
 def _differences(dataset: xr.Dataset, kind: Kind) -> Iterator[str]:

@@ -12,7 +12,7 @@ contacts``. Rectangles are counted alike: ``9 rectangles, 10 contacts``.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from functools import lru_cache
 from itertools import permutations, product
 from typing import Final
@@ -62,6 +62,17 @@ def counts_of_shape(name: str) -> tuple[int, int]:
     """
     found = _SHAPE_COUNTS.fullmatch(name)
     return (int(found[1]), int(found[2])) if found else (0, 0)
+
+
+def joins_of_cells(cells: Collection[Cell]) -> int:
+    """Return how many pairs of cells lie next to each other.
+
+    Examples
+    --------
+    >>> joins_of_cells({(0, 0), (1, 0), (0, 1), (1, 1)})
+    4
+    """
+    return sum(((x + 1, y) in cells) + ((x, y + 1) in cells) for x, y in cells)
 
 
 def counted_class(assemblies: int) -> str:

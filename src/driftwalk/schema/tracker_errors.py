@@ -18,8 +18,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Floats, Integers
-from driftwalk.core.memoize import remembered
+from driftwalk.core.arrays import Bools, Floats, Integers, remembered
 from driftwalk.schema.trajectory import Track
 
 

@@ -8,6 +8,7 @@ angle is the signed angle from the step before to this one (the paper's step ang
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -16,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.files.atomic import atomic_path, require_target, write_atomic
+from driftwalk.core.text_files import parse_json
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.stores.netcdf import netcdf_bytes
 
@@ -136,14 +138,32 @@ def check_trajectory(dataset: xr.Dataset) -> xr.Dataset:
     time = dataset["time"].values
     if time.size and not np.isfinite(time).all():
         raise InputError("not a trajectory dataset: a time stamp is not a finite number")
-    backwards = time[1:] <= time[:-1]
-    if backwards.any():
-        at = int(np.flatnonzero(backwards)[0])
+    require_increasing(time)
+    return dataset
+
+
+def require_increasing(time: Floats) -> None:
+    """Refuse time stamps of which one is not after the one before."""
+    increases = np.diff(time) > 0
+    if not increases.all():
+        at = int(np.flatnonzero(~increases)[0])
         raise InputError(
             f"time does not increase at sample {at + 1}: {time[at]} s is followed by "
             f"{time[at + 1]} s; sort the recording first"
         )
-    return dataset
+
+
+def read_arena(arena: Mapping[str, Any] | str) -> dict[str, Any]:
+    """Return an arena as a dictionary, from its JSON text or a mapping."""
+    if not isinstance(arena, str):
+        return dict(arena)
+    try:
+        facts = parse_json(arena)
+    except FormatError as error:
+        raise InputError(f"the arena is not JSON text ({error}): got {arena!r}") from error
+    if not isinstance(facts, dict):
+        raise InputError(f"the arena must be an object of keys, got {arena!r}")
+    return facts
 
 
 def block_of_study(study: object) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.schema import check_flow_field
+from driftwalk.schema import FLAGS, check_flow_field
 from driftwalk.schema.kinds.motion import WORLD_STATUS
 from driftwalk.simulation.series import frames_of
 
@@ -310,6 +310,59 @@ def wall_edges(outline: Outline) -> Floats:
     normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     return np.column_stack([normal, np.sum(normal * corners, axis=1)])
+
+
+def wall_depth(outline: Outline, x: Floats, y: Floats) -> Floats:
+    """Return how deep points lie inside the wall [m], negative beyond it."""
+    if outline.radius_m is not None:
+        return np.asarray(outline.radius_m - np.hypot(x, y))
+    normal_x, normal_y, offset = wall_edges(outline).T
+    return np.asarray((offset - x[..., None] * normal_x - y[..., None] * normal_y).min(axis=-1))
+
+
+def require_cover(flow: xr.Dataset, tank: Tank) -> None:
+    """Refuse a flow field that does not reach the wall of the tank to within one of its cells.
+
+    Raises
+    ------
+    InputError
+        When the grid ends earlier, or nodes of the tank are flagged as outside of the field's own
+        tank; or when the dataset is no flow field.
+    """
+    check_flow_field(flow)
+    x, y = (flow[name].values.astype(np.float64) for name in ("x", "y"))
+    cells = tuple((nodes[-1] - nodes[0]) / (nodes.size - 1) for nodes in (x, y))
+    radius = tank.radius_m
+    corners = tank.corners_m if radius is None else ((-radius, -radius), (radius, radius))
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    for nodes, cell, begin, end in zip((x, y), cells, low, high, strict=True):
+        if nodes[0] - cell > begin + 1e-9 or nodes[-1] + cell < end - 1e-9:
+            raise InputError(
+                f"the flow field does not cover the tank, a {tank.describe()} that reaches "
+                f"{_range(*np.stack([low, high], axis=1))}: it spans {_range(x, y)}; give the "
+                "field of this tank, or the tank of this field (`tank.diameter_m`, [tank])"
+            )
+    if "flag" not in flow:
+        return
+    outside = flow["flag"].values == FLAGS["outside"]
+    outside = outside.reshape(-1, *outside.shape[-2:]).any(axis=0)
+    inner = wall_depth(tank, *np.meshgrid(x, y)) > float(np.hypot(*cells))
+    lacking = int(np.count_nonzero(outside & inner))
+    if lacking:
+        raise InputError(
+            f"the flow field does not cover the tank, a {tank.describe()}: {lacking} of its "
+            f"{np.count_nonzero(inner)} nodes in there are flagged as outside of the tank that it "
+            "was made for; give the field of this tank, or the tank of this field "
+            "(`tank.diameter_m`, [tank])"
+        )
+
+
+def _range(x: npt.ArrayLike, y: npt.ArrayLike) -> str:
+    ends = [np.asarray(values)[[0, -1]] for values in (x, y)]
+    return ", ".join(
+        f"{name} from {low:.4g} to {high:.4g} m"
+        for name, (low, high) in zip("xy", ends, strict=True)
+    )
 
 
 def world_table(

@@ -10,15 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.core.arrays import Floats
+from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import Purpose
 
 if TYPE_CHECKING:
     from driftwalk.model import Study, Tank
 
-Keys = npt.NDArray[np.uint64]
-"""Address of the random numbers of every world."""
 Fits = Callable[[float, float, float], bool]
 """Whether there is room for a pose x, y [m], theta [rad]."""
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.core.arrays import Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.core.random_streams import world_keys
@@ -85,15 +86,11 @@ def simulate(
     >>> run.sizes["time"]
     3
     """
-    settings = study.simulation
-    count = settings.replicates if replicates is None else replicates
-    if count < 1:
-        raise InputError(f"replicates must be at least 1, got {count}")
+    chosen, keys = replicate_keys(study, replicates, seed)
+    count = keys.size
     if backend not in get_args(Backend):
         raise InputError(f"backend must be one of {', '.join(get_args(Backend))}, got {backend!r}")
-    chosen = settings.seed if seed is None else seed
     times = default_times(study) if sample_time is None else np.asarray(sample_time, np.float64)
-    keys = world_keys(chosen, trial=0, replicate=np.arange(count))
     begin = start if start is not None else _study_start(study, keys)
     check_sample_time(times)
     water = continued_flow(flow, study, duration=float(times[-1]), begin=flow_start)
@@ -134,6 +131,15 @@ def plain_camera(study: Study) -> Camera:
     seen = study.observation
     values = (seen.position_noise_m, seen.orientation_noise_rad, seen.position_quantum_m)
     return Camera(*(0.0 if isinstance(value, str) else value for value in values))
+
+
+def replicate_keys(study: Study, replicates: int | None, seed: int | None) -> tuple[int, Keys]:
+    """Return the seed and the keys of the replicates, those of the study where none are given."""
+    count = study.simulation.replicates if replicates is None else replicates
+    if count < 1:
+        raise InputError(f"replicates must be at least 1, got {count}")
+    chosen = study.simulation.seed if seed is None else seed
+    return chosen, world_keys(chosen, trial=0, replicate=np.arange(count))
 
 
 def default_times(study: Study) -> npt.NDArray[np.float64]:

@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple, Self
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.extras import require_opencv
-from driftwalk.core.text.json_text import json_value, parse_json
+from driftwalk.core.text_files import json_value, parse_json
 from driftwalk.track.types import Image
 
 

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from driftwalk.core.errors import ConfigurationError, FormatError
 from driftwalk.core.files.atomic import atomic_path
-from driftwalk.core.text.toml_text import read_toml
+from driftwalk.core.text_files import read_toml
 from driftwalk.model.section import Section, toml_text
 
 Kind = TypeVar("Kind", bound=Section)

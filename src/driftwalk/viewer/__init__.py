@@ -7,9 +7,8 @@ from driftwalk.viewer.control_stream import pilot
 from driftwalk.viewer.hub import Source
 from driftwalk.viewer.live_client import LiveSource
 from driftwalk.viewer.play.model_playground import ModelPlaySource
-from driftwalk.viewer.play.playground import PlaySource
+from driftwalk.viewer.play.playground import PlaySource, hello_line
 from driftwalk.viewer.play.saved import save_playground
-from driftwalk.viewer.play.stream import hello_line
 from driftwalk.viewer.server import require_server, serve
 from driftwalk.viewer.watch.run_page import RunSource
 

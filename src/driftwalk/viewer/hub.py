@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from driftwalk.core.errors import FormatError
-from driftwalk.core.text.json_text import json_value, parse_json
+from driftwalk.core.text_files import json_value, parse_json
 
 PACED: Final = frozenset({"tank", "frame"})
 """Kinds that wait until the browser has drawn the last one."""

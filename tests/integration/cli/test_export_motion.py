@@ -17,7 +17,7 @@ from command_line import FLOW, contents, here, refusal
 from finished_run import write_finished_run
 
 import driftwalk as dw
-from driftwalk.export.data.ros import first_stamp, topics
+from driftwalk.export.data.writers import first_stamp, topics
 from driftwalk.record import load, save_trajectory
 from driftwalk.schema import body_names, body_track, build_trajectory
 from driftwalk.schema.stores.netcdf import netcdf_bytes

@@ -12,7 +12,7 @@ from command_line import FLOW, RECORDING, here, refusal
 import driftwalk as dw
 from driftwalk.cli.terminal.errors import one_line
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.toml_text import parse_toml
+from driftwalk.core.text_files import parse_toml
 from driftwalk.model.section import SMALLEST
 from driftwalk.simulation import run as simulation
 

@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.assembly.runs.start import inward_depth, require_cover
 from driftwalk.core.errors import InputError
 from driftwalk.model import Tank
 from driftwalk.schema import FLAGS, build_flow_field
+from driftwalk.simulation.backend import require_cover, wall_depth
 
 ROUND = Tank(diameter_m=0.3)
 
@@ -63,8 +63,6 @@ def test_what_is_no_flow_field() -> None:
 
 def test_depth_inside_a_wall() -> None:
     x, y = np.array([0.0, 0.05, 0.2]), np.array([0.0, 0.03, 0.0])
-    np.testing.assert_allclose(
-        inward_depth(ROUND, x, y), [0.15, 0.15 - np.hypot(0.05, 0.03), -0.05]
-    )
+    np.testing.assert_allclose(wall_depth(ROUND, x, y), [0.15, 0.15 - np.hypot(0.05, 0.03), -0.05])
     box = Tank(shape="rectangle", width_m=0.2, height_m=0.1)
-    np.testing.assert_allclose(inward_depth(box, x, y), [0.05, 0.02, -0.1], atol=1e-15)
+    np.testing.assert_allclose(wall_depth(box, x, y), [0.05, 0.02, -0.1], atol=1e-15)

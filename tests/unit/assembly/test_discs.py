@@ -21,7 +21,7 @@ from driftwalk.assembly import (
 )
 from driftwalk.assembly.outcomes.class_names import CONTACT_POLICY, disc_class
 from driftwalk.core.errors import InputError
-from driftwalk.plot.parts.polyomino_sketch import class_cells, disc_places
+from driftwalk.plot.parts.outcome_classes import class_cells, disc_places
 from driftwalk.schema.shapes import contacts_of
 
 DIAMETER = 0.04

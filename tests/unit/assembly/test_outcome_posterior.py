@@ -16,7 +16,6 @@ from driftwalk.assembly import check_outcomes, read_outcomes
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.outcome_posterior.emulator import Emulator, log_likelihoods
 from driftwalk.assembly.outcome_posterior.infer import emulate, posterior_dataset
-from driftwalk.assembly.outcome_posterior.observed import observed_of
 from driftwalk.assembly.outcome_posterior.problem import Checked, Emulated, Nodes
 from driftwalk.assembly.outcome_posterior.records import (
     BOTH,
@@ -26,6 +25,7 @@ from driftwalk.assembly.outcome_posterior.records import (
     TIMES,
     Categories,
     Record,
+    observed_of,
     records_from_text,
     records_of_events,
     records_of_histories,

@@ -14,8 +14,7 @@ from driftwalk.assembly import check_yield, class_at, maximise_yield, proportion
 from driftwalk.assembly.runs.run import assemble
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS
 from driftwalk.assembly.yields.arms import reaches
-from driftwalk.assembly.yields.local_search import compass_search
-from driftwalk.assembly.yields.selection import Tally, halving, tell_apart
+from driftwalk.assembly.yields.selection import Tally, compass_search, halving, tell_apart
 from driftwalk.core.errors import InputError
 
 FEW: dict[str, Any] = {"target": "1+2", "by": 8.0, "runs": 160, "fresh_runs": 30}

@@ -27,7 +27,7 @@ from driftwalk.cli.terminal.output import print_json, print_table, to_json
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import ConfigurationError, FormatError, InputError
 from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, study_overrides
-from driftwalk.core.text.json_text import json_value
+from driftwalk.core.text_files import json_value
 from driftwalk.model import Study, load_study
 from driftwalk.schema.answers.parts import duration_text
 

@@ -9,9 +9,9 @@ import numpy.typing as npt
 import pytest
 
 from driftwalk.core.errors import InputError
-from driftwalk.flow import fill
+from driftwalk.flow import cell_means
 from driftwalk.flow.arena import outline_of
-from driftwalk.flow.fill import fill_velocity
+from driftwalk.flow.cell_means import fill_velocity
 from driftwalk.flow.grid import Grid, make_grid
 
 Array = npt.NDArray[np.float64]
@@ -149,7 +149,7 @@ def test_refuses_to_fill_from_nothing() -> None:
 
 
 def test_says_so_when_the_solver_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fill, "_MAX_ITERATIONS", 1)
+    monkeypatch.setattr(cell_means, "_MAX_ITERATIONS", 1)
     grid = make_grid(outline_of(CIRCLE), cells=20)
     known = np.zeros(grid.shape, dtype=bool)
     known[10, 10] = True

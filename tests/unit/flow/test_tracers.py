@@ -16,8 +16,7 @@ from scipy.stats import binom, t as student
 
 from driftwalk.core.errors import InputError
 from driftwalk.flow import extract_flow, flow_from_tracers, load_flow, save_flow, tracers
-from driftwalk.flow.tracers import LINKS, judge_steps
-from driftwalk.flow.track_steps import Steps, step_noise, track_steps
+from driftwalk.flow.tracers import LINKS, Steps, judge_steps, step_noise, track_steps
 from driftwalk.schema import FLAGS, build_trajectory
 
 Array = npt.NDArray[np.float64]

@@ -23,7 +23,7 @@ from driftwalk.page.sections.assembly import assembly_sections, l1_and_chance
 from driftwalk.page.sections.outcomes import cells_of, sizes_section
 from driftwalk.page.sections.replay import MOST_POSES
 from driftwalk.page.sections.sensitivity import sensitivity_sections
-from driftwalk.plot.parts.polyomino_sketch import class_cells
+from driftwalk.plot.parts.outcome_classes import class_cells
 
 
 def made_up_assembly(path: xr.Dataset) -> xr.Dataset:

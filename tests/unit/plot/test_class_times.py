@@ -14,7 +14,7 @@ from synthetic_assembly import class_times, outcome_classes
 from driftwalk.core.errors import InputError
 from driftwalk.plot.assembly_courses import plot_class_times, plot_survival, spread_apart
 from driftwalk.plot.kinetics import class_graph_of
-from driftwalk.plot.parts.assembly_labels import class_colors
+from driftwalk.plot.parts.outcome_classes import class_colors
 from driftwalk.plot.parts.style import print_style
 
 

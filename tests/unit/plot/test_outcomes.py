@@ -13,7 +13,7 @@ from synthetic_assembly import distribution, outcome_classes, realisations
 
 from driftwalk.core.errors import InputError
 from driftwalk.plot.outcome_bars import plot_outcomes
-from driftwalk.plot.parts.assembly_labels import classes_to_show
+from driftwalk.plot.parts.outcome_classes import classes_to_show
 from driftwalk.plot.parts.style import print_style
 
 

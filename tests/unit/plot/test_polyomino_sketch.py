@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 from synthetic_assembly import outcome_classes
 
 from driftwalk.core.errors import InputError
-from driftwalk.plot.parts.polyomino_sketch import (
+from driftwalk.plot.parts.outcome_classes import (
     GAP,
     class_cells,
     draw_sketches_below,

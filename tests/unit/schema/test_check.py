@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from unknown_names import unknown_names
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.schema import build_dataset, check_dataset, described
-from driftwalk.schema.check import check_contents, unknown_names
+from driftwalk.schema.check import check_contents
 from driftwalk.schema.description import Variable
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 from driftwalk.schema.trajectory import build_steps

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from driftwalk.viewer.frame_filter import SAID_EVERY_S, SoundFrames
 from driftwalk.viewer.hub import to_json
+from driftwalk.viewer.live_client import SAID_EVERY_S, SoundFrames
 
 BODY = {"id": "a", "seen": True, "x_m": 0.1, "y_m": -0.1, "theta_rad": None}
 

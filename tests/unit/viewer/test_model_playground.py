@@ -16,7 +16,7 @@ from driftwalk.model import apply_overrides
 from driftwalk.motion import model_start
 from driftwalk.simulation.backend import Camera
 from driftwalk.viewer import ModelPlaySource
-from driftwalk.viewer.play.bodies import STRETCH_S, MovingBodies
+from driftwalk.viewer.play.model_playground import STRETCH_S, MovingBodies
 
 ACTIVE = {"speed": 0.02, "rotational_diffusion": 0.5, "turn_rate": 0.1}
 

@@ -18,10 +18,9 @@ from driftwalk.core.errors import InputError
 from driftwalk.model import Study
 from driftwalk.schema import build_trajectory
 from driftwalk.viewer.play.motion import MotionWindow, beside
-from driftwalk.viewer.play.playground import PlaySource
+from driftwalk.viewer.play.playground import PlaySource, frame_line, hello_line, joined_faces
 from driftwalk.viewer.play.playground_base import flow_arrows
 from driftwalk.viewer.play.settings import FILLED, KNOBS
-from driftwalk.viewer.play.stream import frame_line, hello_line, joined_faces
 
 STILL = dw.uniform_flow(0.0, 0.0)
 KNOB = {knob.name: knob for knob in KNOBS}

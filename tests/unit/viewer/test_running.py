@@ -22,9 +22,8 @@ from driftwalk.model import Study
 from driftwalk.page.html import page_frame
 from driftwalk.schema import Parameter
 from driftwalk.sweep import grid
-from driftwalk.viewer.watch.assembly import _items
+from driftwalk.viewer.watch.assembly import RunningSensitivity, _blocks, _items
 from driftwalk.viewer.watch.run_page import RunSource
-from driftwalk.viewer.watch.sensitivity import RunningSensitivity, _blocks
 from driftwalk.viewer.watch.shards import StoreReader
 
 DRAG, FORCE = [0.2, 0.3, 0.4], [1e-4, 2e-4, 3e-4, 4e-4]

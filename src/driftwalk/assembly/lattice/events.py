@@ -12,7 +12,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.joined_faces import FaceTable
+from driftwalk.assembly.lattice.joined_faces import (
+    CLOSING,
+    JOINING,
+    OPENING,
+    PARTING,
+    BondGraph,
+    FaceTable,
+)
 from driftwalk.assembly.lattice.many_blocks import (
     DiscWorld,
     ReplayedEvents,
@@ -20,13 +27,6 @@ from driftwalk.assembly.lattice.many_blocks import (
     replay_many,
 )
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
-from driftwalk.assembly.lattice.rigid_joins import (
-    CLOSING,
-    JOINING,
-    OPENING,
-    PARTING,
-    BondGraph,
-)
 from driftwalk.assembly.outcomes.class_names import (
     class_name,
     contact_pairs,

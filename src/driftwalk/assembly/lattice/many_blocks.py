@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, OPENING, PARTING
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, put_beside, shape_order
-from driftwalk.assembly.lattice.rigid_joins import CLOSING, JOINING, OPENING, PARTING
 from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import (
@@ -24,6 +24,7 @@ from driftwalk.schema.shapes import (
     counted_graph,
     counted_shape,
     graph_name,
+    joins_of_cells,
     moved_to_origin,
 )
 
@@ -116,8 +117,7 @@ class SquareWorld:
         return found
 
     def _joins_within(self, body: int) -> int:
-        taken = self.taken[body]
-        return sum(((x + 1, y) in taken) + ((x, y + 1) in taken) for x, y in taken)
+        return joins_of_cells(self.taken[body])
 
     def shape(self, body: int) -> str:
         """Return the name of the shape of a body."""

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.assembly.outcome_posterior.emulator import Emulator, log_likelihoods
-from driftwalk.assembly.outcome_posterior.observed import Outcomes
 from driftwalk.assembly.outcome_posterior.problem import (
     DESIGN_POLICY,
     Checked,
@@ -29,6 +28,7 @@ from driftwalk.assembly.outcome_posterior.records import (
     KINDS,
     TIMES,
     Categories,
+    Outcomes,
     Record,
 )
 from driftwalk.assembly.outcome_posterior.region import (

@@ -15,11 +15,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from driftwalk.assembly.outcome_posterior.emulator import Emulator
-from driftwalk.assembly.outcome_posterior.observed import Observed, Outcomes, merged, observed_of
 from driftwalk.assembly.outcome_posterior.records import (
     KINDS,
     Categories,
+    Observed,
+    Outcomes,
     Record,
+    merged,
+    observed_of,
     records_from_text,
     records_of_events,
     records_to_text,

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
 from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
 from driftwalk.assembly.outcomes.distribution import (
     at_times,
@@ -26,7 +26,7 @@ from driftwalk.assembly.outcomes.survival import checked_times
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.intervals import check_confidence
 from driftwalk.schema.check import build_dataset
-from driftwalk.schema.shapes import cells_of_shape, counts_of_shape, discs_of
+from driftwalk.schema.shapes import cells_of_shape, counts_of_shape, discs_of, joins_of_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,8 +158,7 @@ def compactness(shape: str) -> float:
     size, joins = counts_of_shape(shape)
     if not size:
         cells = set(cells_of_shape(shape))
-        size = len(cells)
-        joins = sum(((x + 1, y) in cells) + ((x, y + 1) in cells) for x, y in cells)
+        size, joins = len(cells), joins_of_cells(cells)
     # ceil(2 sqrt(n)), in whole numbers.
     least = 2 * (math.isqrt(4 * size - 1) + 1)
     return least / (4 * size - 2 * joins)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
+from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
 from driftwalk.assembly.outcomes.distribution import (
     class_names,
     copied_attrs,
@@ -27,7 +27,7 @@ from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import check_confidence, proportion_interval
 from driftwalk.schema.check import build_dataset
-from driftwalk.schema.shapes import all_single, cells_of_shape
+from driftwalk.schema.shapes import all_single, cells_of_shape, joins_of_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -340,7 +340,7 @@ def bridges_of(name: str) -> int:
     """
     bonds = 0
     for cells in map(cells_of_shape, name.split("+")):
-        beside = sum(((x + 1, y) in cells) + ((x, y + 1) in cells) for x, y in cells)
+        beside = joins_of_cells(cells)
         if not cells or beside > len(cells) - 1:
             return 0
         bonds += beside

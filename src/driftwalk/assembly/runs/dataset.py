@@ -14,9 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import replay_contacts, replay_events
-from driftwalk.assembly.lattice.joined_faces import face_table
+from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING, face_table
 from driftwalk.assembly.lattice.many_blocks import ReplayedEvents
-from driftwalk.assembly.lattice.rigid_joins import JOINING, PARTING
 from driftwalk.assembly.runs.start import bond_attrs, glued_cells
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError

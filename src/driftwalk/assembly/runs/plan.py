@@ -18,7 +18,6 @@ from driftwalk.assembly.runs.start import (
     glued_cells,
     place_blocks,
     require_bonds,
-    require_cover,
     require_room,
     with_glue_events,
 )
@@ -27,7 +26,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import default_threads
 from driftwalk.core.random_streams import trial_in, world_keys
-from driftwalk.simulation.backend import Camera, native_model, require_steps
+from driftwalk.simulation.backend import Camera, native_model, require_cover, require_steps
 from driftwalk.simulation.series import continued_flow, flow_starts
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Start of a run: whether the flow covers the tank and the blocks fit it, and their start poses.
+"""Start of a run: whether the blocks fit the tank, and their start poses.
 
 Blocks may start glued together: joined at time 0, permanently. Some bonds that break are refused,
 and the number of events of a run is limited.
@@ -18,14 +18,10 @@ from driftwalk.assembly.outcomes.class_names import overlap_depth
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.flow.arena import outline_of
-from driftwalk.schema import FLAGS, check_flow_field
 from driftwalk.schema.shapes import cells_of_shape
-from driftwalk.simulation.backend import wall_edges
+from driftwalk.simulation.backend import wall_depth
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from driftwalk.model import Assembly, Study, Tank
 
 
@@ -268,11 +264,11 @@ def given_start(study: Study, start: npt.ArrayLike, *, runs: int) -> Floats:
 
 def _require_inside(study: Study, poses: Floats) -> None:
     if study.block.is_round:
-        depth = inward_depth(study.tank, poses[..., 0], poses[..., 1]) - study.block.side_m / 2.0
+        depth = wall_depth(study.tank, poses[..., 0], poses[..., 1]) - study.block.side_m / 2.0
     else:
         x, y = study.block.body().corners.T
         cosine, sine = np.cos(poses[..., 2, None]), np.sin(poses[..., 2, None])
-        depth = inward_depth(
+        depth = wall_depth(
             study.tank,
             poses[..., 0, None] + cosine * x - sine * y,
             poses[..., 1, None] + sine * x + cosine * y,
@@ -307,54 +303,3 @@ def _require_apart(study: Study, poses: Floats) -> None:
                 f"start: blocks {one} and {other} of run {run} overlap by "
                 f"{depth[overlapping[0]]:.3g} m"
             )
-
-
-def require_cover(flow: xr.Dataset, tank: Tank) -> None:
-    """Refuse a flow field that does not reach the wall of the tank to within one of its cells.
-
-    Raises
-    ------
-    InputError
-        When the grid ends earlier, or nodes of the tank are flagged as outside of the field's own
-        tank; or when the dataset is no flow field.
-    """
-    check_flow_field(flow)
-    x, y = (flow[name].values.astype(np.float64) for name in ("x", "y"))
-    cells = tuple((nodes[-1] - nodes[0]) / (nodes.size - 1) for nodes in (x, y))
-    low, high = np.split(np.array(outline_of(tank.to_arena()).bounds), 2)
-    for nodes, cell, begin, end in zip((x, y), cells, low, high, strict=True):
-        if nodes[0] - cell > begin + 1e-9 or nodes[-1] + cell < end - 1e-9:
-            raise InputError(
-                f"the flow field does not cover the tank, a {tank.describe()} that reaches "
-                f"{_range(*np.stack([low, high], axis=1))}: it spans {_range(x, y)}; give the "
-                "field of this tank, or the tank of this field (`tank.diameter_m`, [tank])"
-            )
-    if "flag" not in flow:
-        return
-    outside = flow["flag"].values == FLAGS["outside"]
-    outside = outside.reshape(-1, *outside.shape[-2:]).any(axis=0)
-    inner = inward_depth(tank, *np.meshgrid(x, y)) > float(np.hypot(*cells))
-    lacking = int(np.count_nonzero(outside & inner))
-    if lacking:
-        raise InputError(
-            f"the flow field does not cover the tank, a {tank.describe()}: {lacking} of its "
-            f"{np.count_nonzero(inner)} nodes in there are flagged as outside of the tank that it "
-            "was made for; give the field of this tank, or the tank of this field "
-            "(`tank.diameter_m`, [tank])"
-        )
-
-
-def inward_depth(tank: Tank, x: Floats, y: Floats) -> Floats:
-    """Return how deep points lie inside the wall [m], negative beyond it."""
-    if tank.radius_m is not None:
-        return np.asarray(tank.radius_m - np.hypot(x, y))
-    normal_x, normal_y, offset = wall_edges(tank).T
-    return np.asarray((offset - x[..., None] * normal_x - y[..., None] * normal_y).min(axis=-1))
-
-
-def _range(x: npt.ArrayLike, y: npt.ArrayLike) -> str:
-    ends = [np.asarray(values)[[0, -1]] for values in (x, y)]
-    return ", ".join(
-        f"{name} from {low:.4g} to {high:.4g} m"
-        for name, (low, high) in zip("xy", ends, strict=True)
-    )

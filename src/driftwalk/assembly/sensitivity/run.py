@@ -27,7 +27,7 @@ from driftwalk.assembly.sensitivity.settings import (
 from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import Progress
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.schema.check import build_dataset, described
 from driftwalk.schema.kinds.flow import FLOW_SERIES
 from driftwalk.sweep import threads_of_unit

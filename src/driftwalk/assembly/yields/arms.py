@@ -23,8 +23,7 @@ from driftwalk.assembly.sensitivity.settings import (
     simulate_pieces,
 )
 from driftwalk.assembly.sensitivity.times import kept_times
-from driftwalk.assembly.yields.local_search import SEARCH, starting_points
-from driftwalk.assembly.yields.selection import Tally
+from driftwalk.assembly.yields.selection import SEARCH, Tally, starting_points
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.files.shards import Arrays
 from driftwalk.schema.shapes import all_single

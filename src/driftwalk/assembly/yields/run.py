@@ -18,8 +18,14 @@ from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS, KEYS, Axes, make_axes
 from driftwalk.assembly.yields.arms import Arms, Ranges, Runs, Stores
-from driftwalk.assembly.yields.local_search import SEARCH, compass_search
-from driftwalk.assembly.yields.selection import SELECTION, Selection, halving, tell_apart
+from driftwalk.assembly.yields.selection import (
+    SEARCH,
+    SELECTION,
+    Selection,
+    compass_search,
+    halving,
+    tell_apart,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import proportion_interval
 from driftwalk.core.run_stages import Progress, tell_nobody

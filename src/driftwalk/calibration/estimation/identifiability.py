@@ -72,6 +72,11 @@ def _half_width(column: Floats, parameter: Parameter) -> float:
     if low < DETERMINED.range_end or high > 1.0 - DETERMINED.range_end:
         return float("inf")
     start, value, end = (float(parameter.value_at(share)) for share in (low, middle, high))
+    return relative_half_width(start, value, end, parameter)
+
+
+def relative_half_width(start: float, value: float, end: float, parameter: Parameter) -> float:
+    """Return half an interval over the value, or over a small part of the range if that is more."""
     if parameter.scale == "log":
         return 0.5 * float(np.log(end / start))
     size = max(abs(value), DETERMINED.small_part * (parameter.high - parameter.low))

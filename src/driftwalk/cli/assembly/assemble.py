@@ -5,12 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from driftwalk.cli.inputs.model_source import (
-    RUN_NAMES,
-    assembly_source,
-    with_binding,
-    with_glued,
-)
+from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source, with_binding, with_glued
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option

@@ -13,7 +13,7 @@ from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.study import TANK, StudyOptions, option_name
 from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.core.errors import InputError
-from driftwalk.core.files.bounded import text_of_name
+from driftwalk.core.text_files import text_of_name
 
 if TYPE_CHECKING:
     import xarray as xr

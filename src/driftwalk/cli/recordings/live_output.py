@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_note
-from driftwalk.core.files.bounded import text_of_name
+from driftwalk.core.text_files import text_of_name
 
 if TYPE_CHECKING:
     from driftwalk.cli.recordings.tracking_parts import TrackingParts

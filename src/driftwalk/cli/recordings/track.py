@@ -26,8 +26,7 @@ from driftwalk.cli.terminal.output import (
 )
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
-from driftwalk.core.files.bounded import text_of_name
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json, text_of_name
 
 if TYPE_CHECKING:
     import xarray as xr

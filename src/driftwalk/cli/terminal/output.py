@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from driftwalk.cli.terminal.argument_names import in_options, to_options
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import require_free
-from driftwalk.core.text.json_text import json_value
+from driftwalk.core.text_files import json_value
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from driftwalk.core.errors import DriftwalkError, FormatError, InputError, RunDirectoryError
 from driftwalk.core.files.atomic import remove_partials, rename, write_atomic
-from driftwalk.core.files.bounded import path_inside, read_bounded
 from driftwalk.core.files.shards import make_folder, remove_shards
 from driftwalk.core.provenance import MANIFEST_KIND, file_sha256, read_manifest, utc_now
+from driftwalk.core.text_files import path_inside, read_bounded
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock

@@ -12,7 +12,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, run_file, run_files, state_of
-from driftwalk.core.text.json_text import read_json
+from driftwalk.core.text_files import read_json
 from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 from driftwalk.schema.trajectory import block_of_study
 

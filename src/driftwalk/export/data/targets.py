@@ -15,12 +15,17 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.core.files.atomic import write_atomic
-from driftwalk.core.files.bounded import text_of_name
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json, text_of_name
 from driftwalk.export.data.motion import Motion, find_motions, frame_rate
-from driftwalk.export.data.movement import write_movement
-from driftwalk.export.data.ros import first_stamp, topics, write_ros
-from driftwalk.export.data.tables import particle_numbers, write_csv, write_trackpy
+from driftwalk.export.data.writers import (
+    first_stamp,
+    particle_numbers,
+    topics,
+    write_csv,
+    write_movement,
+    write_ros,
+    write_trackpy,
+)
 from driftwalk.export.target import Source, Target
 from driftwalk.schema import body_names
 from driftwalk.schema.trajectory import POSE

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,40 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.export.simulators.block import Block
-from driftwalk.export.simulators.parts import Folder, stored_text, wall_pieces, write_numbers
+from driftwalk.export.simulators.block import Block, read_block
+from driftwalk.export.simulators.parts import (
+    Folder,
+    stored_text,
+    wall_pieces,
+    words_of,
+    write_common,
+    write_numbers,
+)
 from driftwalk.export.simulators.reference import NO_PATH, PathSet, forces_of, reference_of
-from driftwalk.export.target import Verification
+from driftwalk.export.target import Source, Verification
+
+
+def write_plugin(
+    source: Source,
+    folder: Path,
+    name: str,
+    sources: str,
+    write_world: Callable[[Folder, Block], None],
+) -> list[Path]:
+    """Write the block of a run for a simulator, its plugin into a subfolder, and return the files.
+
+    The plugin's force is C, with the numbers of the model; ``verify`` holds what proves it:
+    driftwalk's numbers, and what compares them.
+    """
+    block = read_block(source)
+    made = Folder(folder)
+    write_common(made, block)
+    write_world(made, block)
+    write_force(made, block, sources)
+    made.copy("force/verify.c", "verify/verify.c")
+    made.text("verify/reference.txt", _reference_text(block))
+    made.fill(f"{name}/README.md", "README.md", words_of(block))
+    return made.files
 
 
 def write_force(folder: Folder, block: Block, sources: str) -> None:
@@ -27,12 +58,6 @@ def write_force(folder: Folder, block: Block, sources: str) -> None:
     for name in ("floating_block.h", "floating_block.c"):
         folder.copy(f"force/{name}", f"{sources}/{name}")
     folder.text(f"{sources}/model_data.c", model_data(block))
-
-
-def write_proof(folder: Folder, block: Block) -> None:
-    """Write what proves the force into ``verify``: driftwalk's numbers, and what compares them."""
-    folder.copy("force/verify.c", "verify/verify.c")
-    folder.text("verify/reference.txt", _reference_text(block))
 
 
 def model_data(block: Block) -> str:

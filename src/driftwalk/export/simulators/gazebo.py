@@ -6,21 +6,9 @@ from pathlib import Path
 from string import Template
 from typing import Final
 
-from driftwalk.export.simulators.block import read_block
-from driftwalk.export.simulators.compiled import (
-    compiler,
-    verify_force,
-    wall_texts,
-    write_force,
-    write_proof,
-)
-from driftwalk.export.simulators.parts import (
-    Folder,
-    start_pose,
-    stored_text,
-    words_of,
-    write_common,
-)
+from driftwalk.export.simulators.block import Block
+from driftwalk.export.simulators.compiled import compiler, verify_force, wall_texts, write_plugin
+from driftwalk.export.simulators.parts import Folder, start_pose, stored_text
 from driftwalk.export.target import Source, Verification
 
 SOURCES: Final = "src"
@@ -28,8 +16,11 @@ SOURCES: Final = "src"
 
 def write(source: Source, folder: Path) -> list[Path]:
     """Write the block of a run for Gazebo; see `Target.write`."""
-    block = read_block(source)
-    made, study = Folder(folder), block.study
+    return write_plugin(source, folder, "gazebo", SOURCES, _world)
+
+
+def _world(made: Folder, block: Block) -> None:
+    study = block.study
     share = 1.0 + study.forces.added_mass_share
     x, y, theta = start_pose(block)
     surface = Template(stored_text("gazebo/surface.sdf")).substitute(
@@ -37,7 +28,6 @@ def write(source: Source, folder: Path) -> list[Path]:
         bounce_speed=repr(study.tank.bounce_speed_m_s),
         friction=repr(study.tank.wall_friction),
     )
-    write_common(made, block)
     made.fill(
         "gazebo/tank.sdf",
         "tank.sdf",
@@ -53,10 +43,6 @@ def write(source: Source, folder: Path) -> list[Path]:
     )
     made.copy("gazebo/CMakeLists.txt", "CMakeLists.txt")
     made.copy("gazebo/driftwalk_water.cc", f"{SOURCES}/driftwalk_water.cc")
-    write_force(made, block, SOURCES)
-    write_proof(made, block)
-    made.fill("gazebo/README.md", "README.md", words_of(block))
-    return made.files
 
 
 require = compiler

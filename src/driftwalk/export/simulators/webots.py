@@ -5,15 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from driftwalk.export.simulators.block import read_block
-from driftwalk.export.simulators.compiled import (
-    compiler,
-    verify_force,
-    wall_texts,
-    write_force,
-    write_proof,
-)
-from driftwalk.export.simulators.parts import Folder, start_pose, words_of, write_common
+from driftwalk.export.simulators.block import Block
+from driftwalk.export.simulators.compiled import compiler, verify_force, wall_texts, write_plugin
+from driftwalk.export.simulators.parts import Folder, start_pose
 from driftwalk.export.target import Source, Verification
 
 PLUGIN: Final = "plugins/physics/driftwalk_water"
@@ -21,11 +15,13 @@ PLUGIN: Final = "plugins/physics/driftwalk_water"
 
 def write(source: Source, folder: Path) -> list[Path]:
     """Write the block of a run for Webots; see `Target.write`."""
-    block = read_block(source)
-    made, study = Folder(folder), block.study
+    return write_plugin(source, folder, "webots", PLUGIN, _world)
+
+
+def _world(made: Folder, block: Block) -> None:
+    study = block.study
     share = 1.0 + study.forces.added_mass_share
     x, y, theta = start_pose(block)
-    write_common(made, block)
     made.fill(
         "webots/tank.wbt",
         "worlds/tank.wbt",
@@ -52,10 +48,6 @@ def write(source: Source, folder: Path) -> list[Path]:
     )
     for name in ("driftwalk_water.c", "Makefile"):
         made.copy(f"webots/{name}", f"{PLUGIN}/{name}")
-    write_force(made, block, PLUGIN)
-    write_proof(made, block)
-    made.fill("webots/README.md", "README.md", words_of(block))
-    return made.files
 
 
 require = compiler

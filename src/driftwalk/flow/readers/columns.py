@@ -11,9 +11,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-
-Array = npt.NDArray[np.float64]
 
 FIELD: Final = ("x", "y", "u", "v")
 _FILLERS: Final = frozenset({"mean", "avg", "average"})
@@ -37,7 +36,7 @@ _SYMBOLS: Final = {
     **dict.fromkeys(("v", "uy", "vy", "dy", "uy1", "vely"), "v"),
 }
 """From a name without its further words to the quantity."""
-_MARKS: Final[dict[str, Callable[[Array], npt.NDArray[np.bool_]]]] = {
+_MARKS: Final[dict[str, Callable[[Floats], npt.NDArray[np.bool_]]]] = {
     **dict.fromkeys(("flags", "mask", "status"), lambda mark: mark == 0.0),
     **dict.fromkeys(("chc",), lambda mark: mark > 0.0),
     **dict.fromkeys(("isvalid", "is valid", "valid"), lambda mark: mark != 0.0),
@@ -191,7 +190,7 @@ def _stated(text: str, names: Sequence[str], known: Sequence[Column]) -> tuple[i
     )
 
 
-def marks_among(names: Sequence[str]) -> dict[int, Callable[[Array], npt.NDArray[np.bool_]]]:
+def marks_among(names: Sequence[str]) -> dict[int, Callable[[Floats], npt.NDArray[np.bool_]]]:
     """Return the columns that say which velocities were measured."""
     bases = [column_of(name).base for name in names]
     return {at: _MARKS[base] for at, base in enumerate(bases) if base in _MARKS}

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.flow.grid import round_nodes
@@ -15,7 +14,6 @@ from driftwalk.flow.readers.units import FieldOptions, FieldScale
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 QUANTITIES: Final = ("u", "v", "x", "y", "time", "mask")
 _STANDARD: Final = {

@@ -9,16 +9,14 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import FormatError, damaged_as
 from driftwalk.flow.readers.text import masked_rows
 from driftwalk.flow.readers.units import RawField
 from driftwalk.schema.stores.hdf5_texts import refuse_endless_texts
 from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, matlab_variables, read_old
 from driftwalk.schema.stores.netcdf import HDF5, declared_bytes, refuse_elsewhere, refuse_huge
-
-Array = npt.NDArray[np.float64]
 
 _ENDINGS: Final = ("_filtered", "_original", "")
 """Of what PIVlab saves of the velocities, the first that is there is read."""
@@ -97,7 +95,7 @@ def read(path: Path) -> RawField:
     return RawField(rows, length, velocity, down=True, notes=notes, reading=reading)
 
 
-def _mean(velocity: Array) -> Array:
+def _mean(velocity: Floats) -> Floats:
     """Return the mean over frames at each node, shape (n, 2), NaN where no frame has any."""
     count = np.isfinite(velocity).sum(axis=0)
     return np.where(count > 0, np.nansum(velocity, axis=0) / np.maximum(count, 1), np.nan)
@@ -166,7 +164,7 @@ def _frames(file: _File) -> list[_Names]:
     return []
 
 
-def _frame(file: _File, names: _Names) -> Iterator[Array]:
+def _frame(file: _File, names: _Names) -> Iterator[Floats]:
     """Yield x, y, u, v of every frame, shape (n, 4), NaN where a vector was not measured."""
     lacking = [name for name in names[:4] if name not in file.names]
     if lacking:
@@ -188,7 +186,7 @@ def _frame(file: _File, names: _Names) -> Iterator[Array]:
         yield frame
 
 
-def _units(file: _File) -> tuple[str, str, Array]:
+def _units(file: _File) -> tuple[str, str, Floats]:
     """Return the units of positions and velocities, and the factors to them.
 
     An export says its units and is calibrated. A session has pixels, and factors to m and m/s that

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.flow.grid import FieldRows
 from driftwalk.flow.readers.columns import (
@@ -25,7 +26,6 @@ from driftwalk.flow.readers.columns import (
 from driftwalk.flow.readers.programs import HEAD, PLAIN, Program, program_of
 from driftwalk.flow.readers.units import RawField
 
-Array = npt.NDArray[np.float64]
 Lines = list[tuple[int, str]]
 
 _DELIMITERS: Final = ("\t", ";", ",", None)
@@ -160,7 +160,7 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
     )
 
 
-def _marks(layout: Layout) -> dict[int, Callable[[Array], npt.NDArray[np.bool_]]]:
+def _marks(layout: Layout) -> dict[int, Callable[[Floats], npt.NDArray[np.bool_]]]:
     """Return the columns that mark missing velocities, without those of words."""
     first = dict(enumerate(layout.rows[0][1].split(layout.delimiter)))
     return {
@@ -170,7 +170,7 @@ def _marks(layout: Layout) -> dict[int, Callable[[Array], npt.NDArray[np.bool_]]
     }
 
 
-def _sentinels(velocity: Array) -> list[float]:
+def _sentinels(velocity: Floats) -> list[float]:
     """Return the values far beyond all others that mark a missing velocity."""
     known = velocity[np.isfinite(velocity).all(axis=1)]
     alike = known[known[:, 0] == known[:, 1], 0]
@@ -362,7 +362,7 @@ def _split(line: str, delimiter: str | None) -> list[str]:
     return fields[:-1] if len(fields) > 4 and not fields[-1].strip() and delimiter else fields
 
 
-def _numbers(layout: Layout, wanted: Sequence[int]) -> tuple[npt.NDArray[np.intp], Array]:
+def _numbers(layout: Layout, wanted: Sequence[int]) -> tuple[npt.NDArray[np.intp], Floats]:
     """Return the line numbers and the wanted columns, shape (n, columns), NaN where missing."""
     values = np.empty((len(layout.rows), len(wanted)))
     width, comma = len(layout.names), layout.delimiter != ","
@@ -385,7 +385,7 @@ def _numbers(layout: Layout, wanted: Sequence[int]) -> tuple[npt.NDArray[np.intp
 
 
 def masked_rows(
-    line: npt.NDArray[np.intp], values: Array, missing: npt.NDArray[np.bool_]
+    line: npt.NDArray[np.intp], values: Floats, missing: npt.NDArray[np.bool_]
 ) -> FieldRows:
     """Return rows x, y, u, v whose velocities are NaN where they are missing.
 

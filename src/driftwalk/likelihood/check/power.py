@@ -2,7 +2,8 @@
 
 A criterion fails at `level`. From the distribution of its statistic under the model follows the
 alternative at which it fails with probability `POWER.share`: the noncentrality of a chi squared, or
-standard deviations of a normal.
+standard deviations of a normal. Criteria, scan, posterior predictive test and measured flow share
+it, so it stands below them.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from driftwalk.calibration.problem import Problem, prepare_problem
 from driftwalk.comparison import StepPlan, apply_steps, plan_steps
 from driftwalk.comparison.statistic import FEWEST_PAIRS
 from driftwalk.conditions import recorded_camera
-from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.core.arrays import Bools, Floats, Integers, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import map_in_threads
 from driftwalk.core.random_streams import CheckStream, world_keys
@@ -44,8 +44,6 @@ from driftwalk.schema.answers.facts import fitted_value
 if TYPE_CHECKING:
     import xarray as xr
 
-
-Keys = npt.NDArray[np.uint64]
 
 Path = tuple[Floats, npt.NDArray[np.floating], npt.NDArray[np.floating]]
 """Times [s], x and y [m]."""

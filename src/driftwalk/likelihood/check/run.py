@@ -10,12 +10,7 @@ import numpy as np
 from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.likelihood.angle_consistency import log_evidence, negated
-from driftwalk.likelihood.check.criteria import (
-    VERDICT,
-    components_of,
-    criteria_of,
-    distance_limit,
-)
+from driftwalk.likelihood.check.criteria import VERDICT, components_of, criteria_of, distance_limit
 from driftwalk.likelihood.check.errors import Innovations, innovations_of
 from driftwalk.likelihood.check.measured import left_out_sentence
 from driftwalk.likelihood.check.place import Residuals, residuals_of

@@ -34,11 +34,11 @@ from driftwalk.likelihood.filter.parameters import (
     INTENSITIES,
     OF_PREDICTIONS,
     STRENGTHS,
+    Body,
     Point,
 )
 from driftwalk.likelihood.filter.series import (
     FILTER,
-    Body,
     Series,
     corrected,
     layer_strengths,

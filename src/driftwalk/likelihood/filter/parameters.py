@@ -1,4 +1,4 @@
-"""The parameter vector of the fit: flow, ln C_d, noises, and numbers of departures.
+"""The parameter vector of the fit: flow, ln C_d, noises, numbers of departures; and the body.
 
 A departure is a way in which the world can differ from the model; it has one number or a few. In
 the model each has the value of `Number.model`; opened, it is a parameter like the noises, with a
@@ -9,12 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.simulation.series import within_frames
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+    from driftwalk.model.block import Block
+    from driftwalk.model.rigid_bodies import RigidBody
 
 
 class Number(NamedTuple):
@@ -205,3 +211,60 @@ class Point:
                 value = min(max(value, NUMBERS[name].low), NUMBERS[name].high)
             moved = moved.with_extra(name, value)
         return moved
+
+
+@dataclass(frozen=True)
+class Body:
+    """The block and the water, as arguments of the native filter."""
+
+    side: float
+    mass: float
+    depth: float
+    strips: int
+    water_density: float
+    drag_speed: float
+    """Speed [m/s] at which C_d holds, whatever the power of the drag."""
+    orientation: str
+    """"state", "given" or "none": the track's angle is measured like the position, is an input, or
+    is not used."""
+    block: Block
+    hidden_share: float
+    """Share of the drag of a free face that a face between two glued blocks feels."""
+
+    @cached_property
+    def outline(self) -> RigidBody:
+        """The outline of the body."""
+        return self.block.body(self.hidden_share)
+
+    def native(self, point: Point) -> dict[str, Any]:
+        """Return the arguments of the native filter."""
+        names = ("side", "mass", "depth", "strips", "water_density", "drag_speed", "orientation")
+        numbers = {name: getattr(self, name) for name in names}
+        if self.outline.is_square:
+            return numbers
+        outline = self.outline
+        if "hidden_share" in point.opened or "hidden_share" in point.fixed:
+            outline = self.block.body(point.number("hidden_share"))
+        return {
+            **numbers,
+            "panels": outline.panels,
+            "moment_points": outline.moment_points,
+            "mass_by_inertia": 1.0 / outline.moment_m2,
+            "symmetry": max(outline.symmetry, 1),
+            "round": outline.disc_radius_m > 0.0,
+        }
+
+
+def body_of(study: Study, used_angle: str) -> Body:
+    """Return the block of a study as the filter takes it."""
+    return Body(
+        side=study.block.side_m,
+        mass=study.block.mass_kg,
+        depth=study.wetted_depth_m,
+        strips=study.block.strips_per_face,
+        water_density=study.water.density_kg_m3,
+        drag_speed=study.forces.drag_speed_m_s,
+        orientation=used_angle,
+        block=study.block,
+        hidden_share=study.assembly.hidden_share,
+    )

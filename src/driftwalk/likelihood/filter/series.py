@@ -1,4 +1,4 @@
-"""Tracks and the block as the filter takes them: angles smoothed, contacts with the wall left out.
+"""Tracks as the filter takes them: angles smoothed, contacts with the wall left out.
 
 The rule for contacts looks at the past only. To leave out an interval because of where the body is
 at its end would select among the forces that brought it there, and bias what is estimated.
@@ -9,21 +9,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.arrays import Bools, Floats
-from driftwalk.core.memoize import remembered
+from driftwalk.core.arrays import Bools, Floats, remembered
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.model.block import Block
-    from driftwalk.model.bodies import RigidBody
     from driftwalk.schema import Track
 
 
@@ -143,48 +140,6 @@ class Series:
         names = ("time", "x", "y", "theta", "omega", "angle", "velocity_prior")
         whole = {name: getattr(self, name) for name in names}
         return {name: values if values is None else values[kept] for name, values in whole.items()}
-
-
-@dataclass(frozen=True)
-class Body:
-    """The block and the water, as arguments of the native filter."""
-
-    side: float
-    mass: float
-    depth: float
-    strips: int
-    water_density: float
-    drag_speed: float
-    """Speed [m/s] at which C_d holds, whatever the power of the drag."""
-    orientation: str
-    """"state", "given" or "none": the track's angle is measured like the position, is an input, or
-    is not used."""
-    block: Block
-    hidden_share: float
-    """Share of the drag of a free face that a face between two glued blocks feels."""
-
-    @cached_property
-    def outline(self) -> RigidBody:
-        """The outline of the body."""
-        return self.block.body(self.hidden_share)
-
-    def native(self, point: Point) -> dict[str, Any]:
-        """Return the arguments of the native filter."""
-        names = ("side", "mass", "depth", "strips", "water_density", "drag_speed", "orientation")
-        numbers = {name: getattr(self, name) for name in names}
-        if self.outline.is_square:
-            return numbers
-        outline = self.outline
-        if "hidden_share" in point.opened or "hidden_share" in point.fixed:
-            outline = self.block.body(point.number("hidden_share"))
-        return {
-            **numbers,
-            "panels": outline.panels,
-            "moment_points": outline.moment_points,
-            "mass_by_inertia": 1.0 / outline.moment_m2,
-            "symmetry": max(outline.symmetry, 1),
-            "round": outline.disc_radius_m > 0.0,
-        }
 
 
 def corrected(series: Series, point: Point) -> tuple[Floats, Floats, Floats]:
@@ -577,18 +532,3 @@ def stretches_unsettled(series: Sequence[Series]) -> str:
             f"nothing for {FILTER.least_free_s:g} s and more"
         )
     return ""
-
-
-def body_of(study: Study, used_angle: str) -> Body:
-    """Return the block of a study as the filter takes it."""
-    return Body(
-        side=study.block.side_m,
-        mass=study.block.mass_kg,
-        depth=study.wetted_depth_m,
-        strips=study.block.strips_per_face,
-        water_density=study.water.density_kg_m3,
-        drag_speed=study.forces.drag_speed_m_s,
-        orientation=used_angle,
-        block=study.block,
-        hidden_share=study.assembly.hidden_share,
-    )

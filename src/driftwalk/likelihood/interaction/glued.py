@@ -26,8 +26,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError, argument_text
-from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.filter.series import Body
+from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.interval_inflation import INFLATION
 from driftwalk.likelihood.newton import Mode
 from driftwalk.likelihood.preparation import Estimate, PreparedRecordings, estimate_of

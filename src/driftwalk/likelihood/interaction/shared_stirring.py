@@ -29,11 +29,7 @@ from driftwalk.likelihood.filter.difference_pairs import unpacked
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import FILTER, Series
-from driftwalk.likelihood.interaction.glued import (
-    SharedStirring,
-    length_quantiles,
-    most_likely,
-)
+from driftwalk.likelihood.interaction.glued import SharedStirring, length_quantiles, most_likely
 from driftwalk.likelihood.newton import thinned
 from driftwalk.likelihood.preparation import PreparedRecordings
 

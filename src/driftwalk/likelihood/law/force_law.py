@@ -18,8 +18,8 @@ from driftwalk.likelihood.filter.parameters import (
     INTENSITIES,
     STRENGTHS,
     Point,
+    body_of,
 )
-from driftwalk.likelihood.filter.series import body_of
 from driftwalk.likelihood.newton import Mode, ModeSearch, inverse
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.facts import fitted_value

@@ -25,8 +25,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.arrays import Floats, Integers
-from driftwalk.core.memoize import remembered
+from driftwalk.core.arrays import Floats, Integers, remembered
 from driftwalk.likelihood.filter.series import ORIENTED_SHARE
 from driftwalk.schema import Track
 from driftwalk.schema.tracker_errors import estimate_tracking_noise

@@ -12,8 +12,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import ConfigurationError, FormatError, did_you_mean
-from driftwalk.core.files.bounded import MIB
-from driftwalk.core.text.json_text import json_value, parse_json
+from driftwalk.core.text_files import MIB, json_value, parse_json
 from driftwalk.motion.external_program.process import ProgramFault, Request
 from driftwalk.motion.protocol import in_words, world_seeds, world_starts
 from driftwalk.schema import Parameter

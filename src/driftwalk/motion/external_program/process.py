@@ -19,7 +19,7 @@ from threading import Condition, Event, Thread
 from typing import Final, NamedTuple
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.files.bounded import MIB
+from driftwalk.core.text_files import MIB
 
 GRACE_S: Final = 1.0
 """Time that a program has to end by itself."""

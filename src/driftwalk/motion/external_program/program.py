@@ -22,8 +22,8 @@ import numpy as np
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.arrays import Keys
 from driftwalk.core.errors import ConfigurationError, InputError, did_you_mean
-from driftwalk.core.files.bounded import text_of_name
 from driftwalk.core.provenance import file_sha256
+from driftwalk.core.text_files import text_of_name
 from driftwalk.motion.camera import observe_worlds
 from driftwalk.motion.external_program.lines import (
     PARAMETERS_REQUEST,

@@ -19,7 +19,7 @@ from driftwalk.page.sections.outcomes import (
     size_sections,
 )
 from driftwalk.page.sections.replay import replay_section
-from driftwalk.plot.parts.assembly_labels import class_names
+from driftwalk.plot.parts.outcome_classes import class_names
 from driftwalk.schema.answers.assembly import attraction_words, steady_parts, steady_words
 from driftwalk.schema.answers.parts import Table
 from driftwalk.schema.kinds.sensitivity import axis_number

@@ -12,7 +12,7 @@ from driftwalk.page import parts
 from driftwalk.page.parts import Maker, Section, quantity, require, required, value_of
 from driftwalk.page.sections.outcomes import cells_of, class_times_section
 from driftwalk.plot.kinetics import class_graph_of, placed_arrows
-from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.plot.parts.outcome_classes import are_discs
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.kinetics import (
     choice_words,

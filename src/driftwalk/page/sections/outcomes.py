@@ -12,8 +12,15 @@ from driftwalk.core.units import percent
 from driftwalk.page import parts
 from driftwalk.page.arrays import number, numbers
 from driftwalk.page.parts import Section, count, require, value_of
-from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
-from driftwalk.plot.parts.polyomino_sketch import are_discs, class_cells, is_class
+from driftwalk.plot.parts.outcome_classes import (
+    OTHER,
+    are_discs,
+    class_cells,
+    class_names,
+    classes_to_show,
+    is_class,
+    with_rest,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import binary_step, encode_array
 from driftwalk.page.parts import Section, arena_part, count, quantity, require, required, section
 from driftwalk.page.sections.outcomes import cells_of
-from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.plot.parts.outcome_classes import are_discs
 from driftwalk.schema.shapes import all_single
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from driftwalk.page.sections.sensitivity_maps import (
     value_words,
 )
 from driftwalk.plot.components import biplot_of
-from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.plot.parts.outcome_classes import are_discs
 from driftwalk.schema.kinds.sensitivity import axis_number
 
 if TYPE_CHECKING:

@@ -13,8 +13,13 @@ from driftwalk.page import parts
 from driftwalk.page.arrays import encode_array, numbers
 from driftwalk.page.parts import Section, quantity, require, value_of
 from driftwalk.page.sections.outcomes import cells_of
-from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
-from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.plot.parts.outcome_classes import (
+    OTHER,
+    are_discs,
+    class_names,
+    classes_to_show,
+    with_rest,
+)
 from driftwalk.schema.kinds.sensitivity import AXIS_NUMBERS, axis_number
 
 if TYPE_CHECKING:

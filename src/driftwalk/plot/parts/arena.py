@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.labels import FACTORS
 from driftwalk.plot.parts.style import INK
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,17 +37,7 @@ def arena_of(dataset: xr.Dataset, arena: Mapping[str, Any] | str | None = None) 
         When the text is not JSON.
     """
     described = dataset.attrs.get("arena") if arena is None else arena
-    if not described:
-        return {}
-    if not isinstance(described, str):
-        return dict(described)
-    try:
-        facts = parse_json(described)
-    except FormatError as error:
-        raise InputError(f"the arena is not JSON ({error}): got {described!r}") from error
-    if not isinstance(facts, dict):
-        raise InputError(f"the arena must be an object of keys, got {described!r}")
-    return facts
+    return read_arena(described) if described else {}
 
 
 def arena_patch(arena: Mapping[str, Any]) -> Patch:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.toml_text import parse_toml
+from driftwalk.core.text_files import parse_toml
 from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
 from driftwalk.schema.check import check_contents, kind_name

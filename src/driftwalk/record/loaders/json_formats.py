@@ -11,8 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.files.bounded import MIB
-from driftwalk.core.text.json_text import MOST_BYTES, parse_json
+from driftwalk.core.text_files import MIB, MOST_JSON_BYTES, parse_json
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.tables.in_memory import MemorySource, objects
@@ -54,11 +53,11 @@ class JsonPointsLoader:
 def bounded_text(path: Path) -> bytes:
     """Return the contents of a file, or refuse more than JSON is read of."""
     with open_binary(path) as file:
-        text = file.read(MOST_BYTES + 1)
-    if len(text) > MOST_BYTES:
+        text = file.read(MOST_JSON_BYTES + 1)
+    if len(text) > MOST_JSON_BYTES:
         raise FormatError(
-            f"holds more than {MOST_BYTES / MIB:g} MiB of JSON: store it as CSV, which is read "
-            "piece by piece"
+            f"holds more than {MOST_JSON_BYTES / MIB:g} MiB of JSON: store it as CSV, which is "
+            "read piece by piece"
         )
     return text
 

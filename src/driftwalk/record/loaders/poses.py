@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.clean import split_bodies
 from driftwalk.record.containers import Hdf5Contents, frame_in, names_in, opened_hdf5, text_of

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import parse_json
 from driftwalk.schema.description import Kind, Number, Variable
 from driftwalk.schema.kinds.calibration import CALIBRATION, OPTIMUM, calibration_of
 from driftwalk.schema.kinds.fit import FIT, PARAMETERS

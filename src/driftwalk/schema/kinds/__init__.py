@@ -11,15 +11,11 @@ from driftwalk.schema.kinds import (
     control,
     fit,
     flow,
-    kinetics,
     model_check,
-    models,
     motion,
-    outcome_posterior,
+    outcomes,
     recovery,
     sensitivity,
-    steady_state,
-    yields,
 )
 from driftwalk.schema.parameters import is_block, stored_parameters
 
@@ -27,8 +23,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _FILES: Final = (
-    motion, flow, calibration, models, fit, recovery, model_check, assembly, steady_state,
-    sensitivity, kinetics, outcome_posterior, yields, control,
+    motion, flow, calibration, fit, recovery, model_check, assembly, outcomes, sensitivity,
+    control,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from driftwalk.schema.description import (
-    SOURCE_WARNINGS,
-    Attribute,
-    Variable,
-    attributes,
-    kind,
-    limited,
-    variables,
-)
+from driftwalk.schema.description import SOURCE_WARNINGS, Variable, attributes, kind, variables
 from driftwalk.schema.kinds.flow import FLOW_SERIES, began_in_flow
 from driftwalk.schema.kinds.motion import WORLD_STATUS
 
@@ -53,9 +45,10 @@ attributes (latching by a connector):
 """),
     *FLOW_SERIES,
 )
-_CLASS: Final = (
+CLASS: Final = (
     "class(class) text: outcome class; [names](../explanation/assembly.md#outcome-classes)"
 )
+"""Variable of the kinds with one number for each outcome class."""
 _ORDER: Final = "first of the assembly that stayed, then of the one that was moved"
 _FACES: Final = "faces that joined, in the blocks' own frames: 0 +x, 1 +y, 2 -x, 3 -y"
 _POLES: Final = """
@@ -105,7 +98,7 @@ variables:
     status(run) bits: problems in a run; 0 is sound
     run int
     block int
-    {_CLASS}
+    {CLASS}
     shape(shape) text: shape of an assembly
 variables (blocks that are squares):
     event_face(run event side) int: {_FACES}; {_NOWHERE}
@@ -162,100 +155,6 @@ variables:
     *SETTINGS,
 )
 
-_OF_RUNS: Final = "made from runs"
-_SETTINGS_OF_RUNS: Final = tuple(limited(SETTINGS, _OF_RUNS, without="runs"))
-_REALISED: Final = "the reference of a sensitivity analysis"
-
-OUTCOME_DISTRIBUTION: Final = kind(
-    f"""
-kind: outcome_distribution
-version: 1
-dimensions:
-    class: outcome classes
-    realisation: realisations of the reference
-    time: from the start of the runs to their end
-    class_over_time: classes that occur
-variables:
-    count(class) [1] int: runs of this class
-    proportion(class) [1]: share of runs
-    interval_low(class) [1]: lower limit of the simultaneous confidence interval
-    interval_high(class) [1]: upper limit of the simultaneous confidence interval
-    {_CLASS}
-variables ({_REALISED}):
-    realisation_count(realisation class) [1] int: runs of this class
-    realisation_proportion(realisation class) [1]: share of runs
-    standard_deviation(class) [1]: standard deviation of the share over realisations
-    count_over_time(time class_over_time) [1] int: runs of this class at this time; of all \
-        realisations
-    time(time) [s]: time from the start of the run
-    class_over_time(class_over_time) text: outcome class
-attributes:
-    runs number: runs with an outcome
-    confidence number: with which all intervals hold at once
-    method text: of the intervals
-    complete number: share of runs with one assembly
-    complete_low number: lower end of its interval
-    complete_high number: upper end of its interval
-attributes ({_OF_RUNS}):
-    left_out number: runs without an outcome
-    time_s number: when the outcomes were read
-    drawn text: as of the runs
-attributes ({_REALISED}):
-    realisations number: realisations
-    mean_pairwise_l1 number: mean l1 distance of two
-    expected_pairwise_l1 number: what chance alone gives
-    drag_coefficient number: of the reference
-    force_std_N number: of the reference
-""",
-    *_SETTINGS_OF_RUNS,
-    *SOURCE_WARNINGS,
-)
-
-
-def _course(name: str, words: str) -> tuple[Variable, ...]:
-    return variables(f"""
-    {name}(time) [1]: share of runs before {words}
-    {name}_low(time) [1]: lower limit, share before {words}
-    {name}_high(time) [1]: upper limit, share before {words}
-""")
-
-
-def _medians(name: str, words: str) -> tuple[Attribute, ...]:
-    return attributes(f"""
-    {name}_median_s number: median time of {words}, NaN when not reached
-    {name}_median_low_s number: lower end of its interval
-    {name}_median_high_s number: upper end of its interval
-""")
-
-
-CLASS_TIMES: Final = kind(
-    f"""
-kind: class_times
-version: 1
-dimensions:
-    time: from the start of the runs
-    class: outcome classes
-variables:
-    proportion(time class) [1]: share of runs
-    proportion_low(time class) [1]: lower limit of the share of runs
-    proportion_high(time class) [1]: upper limit of the share of runs
-    time(time) [s]: time from the start of the run
-    {_CLASS}
-attributes:
-    runs number: runs with an outcome
-    left_out number: runs without an outcome
-    confidence number: with which an interval holds at its time
-attributes ({_OF_RUNS}):
-    drawn text: as of the runs
-""",
-    *_course("first_contact", "first contact"),
-    *_course("completion", "completion"),
-    *_medians("first_contact", "first contact"),
-    *_medians("completion", "completion"),
-    *_SETTINGS_OF_RUNS,
-)
-
-
 ATTRACTION: Final = kind(
     """
 kind: attraction
@@ -276,48 +175,6 @@ attributes:
     capped_below_m number: gap below which the simulated force is smaller; 0 where it is not
     study
 """
-)
-
-
-def _mean(name: str, dim: str, words: str, note: str = "") -> tuple[Variable, ...]:
-    return variables(f"""
-    {name}({dim}) [1]: {words}, mean over runs{note}
-    {name}_low({dim}) [1]: lower limit, {words}; NaN of a single run
-    {name}_high({dim}) [1]: upper limit, {words}; NaN of a single run
-""")
-
-
-ASSEMBLY_SIZES: Final = kind(
-    f"""
-kind: assembly_sizes
-version: 1
-dimensions:
-    size: sizes: each up to 8 alone, beyond that groups that double
-    time: from the start of the runs
-variables:
-    size(size) int: smallest size of the group, in blocks
-    size_to(size) int: largest size of the group, in blocks
-    time(time) [s]: time from the start of the run
-attributes:
-    runs number: runs with an outcome
-    left_out number: runs without an outcome
-    confidence number: with which an interval holds, each on its own
-    method text: of the intervals
-    compactness number: least perimeter over that of the assembly, of assemblies of four blocks \
-        and more, weighted by blocks; mean over runs, NaN where there are none
-    compactness_low number: lower end of its interval
-    compactness_high number: upper end of its interval
-    compactness_runs number: runs with an assembly of four blocks or more
-attributes ({_OF_RUNS}):
-    drawn text: as of the runs
-""",
-    *_mean("number", "size", "assemblies of this size per run", "; at the end"),
-    *_mean("block_share", "size", "share of the blocks in assemblies of this size", "; at the end"),
-    *_mean("mean_size", "time", "blocks over assemblies"),
-    *_mean("largest_share", "time", "share of the blocks in the largest assembly"),
-    *_mean("free_share", "time", "share of the blocks that are alone"),
-    *_mean("compactness", "time", "compactness, as at the end", "; NaN where no run has one"),
-    *_SETTINGS_OF_RUNS,
 )
 
 
@@ -365,7 +222,7 @@ variables:
     outcome(time) int: outcome class, -1 unknown; index into 'class'
     assembly(time body) int: lowest body of the assembly, -1 unknown
     proportion(class) [1]: share of the time in which the class is known
-    {_CLASS}
+    {CLASS}
     event_assembly(event side) int: lowest body of the assemblies that joined; {_NOWHERE}
     event_shape(event part) int: shapes of the two assemblies and of both joined: index into \
         'shape'; {_NOWHERE}
@@ -409,9 +266,6 @@ attributes (the tank is known):
 KINDS: Final = (
     ASSEMBLY,
     ASSEMBLY_PATH,
-    OUTCOME_DISTRIBUTION,
-    CLASS_TIMES,
     ATTRACTION,
-    ASSEMBLY_SIZES,
     CLASSIFICATION,
 )

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from driftwalk.core.errors import DriftwalkError, FormatError, InputError
-from driftwalk.core.files.bounded import text_of_name
 from driftwalk.core.files.run_layout import (
     MANIFEST_FILE,
     RECORD_FILE,
@@ -21,6 +20,7 @@ from driftwalk.core.files.run_layout import (
 )
 from driftwalk.core.files.shards import read_specification
 from driftwalk.core.provenance import read_manifest, refuse_other_version
+from driftwalk.core.text_files import text_of_name
 from driftwalk.schema.runs.run_kinds import (
     RUN_KINDS,
     Maker,

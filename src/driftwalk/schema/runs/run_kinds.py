@@ -170,7 +170,7 @@ BUILT_IN: Final = (
         datasets=("reference", "components", "sobol"),
         figures="driftwalk.figures.assembly:sensitivity_figures",
         page=f"{_SECTIONS}.sensitivity:sensitivity_sections",
-        live=f"{_WATCH}.sensitivity:RunningSensitivity",
+        live=f"{_WATCH}.assembly:RunningSensitivity",
         answer=f"{_ANSWERS}.sensitivity:sensitivity_answer",
     ),
     RunKind(
@@ -206,7 +206,7 @@ BUILT_IN: Final = (
         file="yields.nc",
         figures="driftwalk.figures.assembly:yield_figures",
         page=f"{_SECTIONS}.yields:yield_sections",
-        live=f"{_WATCH}.yields:RunningYield",
+        live=f"{_WATCH}.assembly:RunningYield",
         answer=f"{_ANSWERS}.yields:yield_answer",
         places={"figures": "figures"},
     ),

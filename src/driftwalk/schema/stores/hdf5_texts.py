@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from driftwalk.core.errors import FormatError
-from driftwalk.core.files.bounded import MIB
+from driftwalk.core.text_files import MIB
 
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _COLLECTION: Final = b"GCOL\x01\x00\x00\x00"

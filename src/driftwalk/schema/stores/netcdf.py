@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import FormatError
-from driftwalk.core.files.bounded import MIB
+from driftwalk.core.text_files import MIB
 from driftwalk.schema.check import refuse_other_version
 from driftwalk.schema.stores.hdf5_texts import refuse_endless_texts
 

@@ -1,4 +1,7 @@
-"""An HDF5 file whose objects are looked up once: h5netcdf asks for each some thirty times."""
+"""An HDF5 file whose objects are looked up once: h5netcdf asks for each some thirty times.
+
+The class stands alone, as its base needs h5py, which is imported only where a file is opened.
+"""
 
 from __future__ import annotations
 

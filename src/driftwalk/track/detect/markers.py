@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from driftwalk.core.arrays import Singles
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.section import Quantity, Section
 from driftwalk.track.toml_file import load_sections, save_sections
@@ -167,9 +168,6 @@ def save_markers(path: str | Path, marker: TwoColourMarker) -> Path:
     return save_sections(path, marker, head=_HEAD)
 
 
-Weights = npt.NDArray[np.float32]
-
-
 class ChromaPolicy(NamedTuple):
     """Which pixels show a marker's colour."""
 
@@ -207,7 +205,7 @@ class ChromaTables:
     def __init__(self, marker: TwoColourMarker) -> None:
         between = hue_difference(marker.colour_1, marker.colour_2)
         pair = (marker.colour_1, marker.colour_2)
-        self.soft: list[Weights] = [_table(colour, between) for colour in pair]
+        self.soft: list[Singles] = [_table(colour, between) for colour in pair]
         self.label: npt.NDArray[np.uint8] = np.zeros(1 << 16, dtype=np.uint8)
         for number, table in enumerate(self.soft, start=1):
             self.label[table > _CHROMA.core] = number
@@ -220,7 +218,7 @@ class ChromaTables:
         return np.asarray(pair.view("<u2")[..., 0], dtype=np.uint16)
 
 
-def _table(colour: MarkerColour, between: float) -> Weights:
+def _table(colour: MarkerColour, between: float) -> Singles:
     code = np.arange(1 << 16)
     a, b = (code & 255) - 128.0, (code >> 8) - 128.0
     cos, sin = math.cos(colour.hue_rad), math.sin(colour.hue_rad)

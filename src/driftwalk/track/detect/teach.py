@@ -20,7 +20,7 @@ from driftwalk.track.detect.markers import (
     TwoColourMarker,
     hue_difference,
 )
-from driftwalk.track.detect.two_colour_discs import Disc, find_regions
+from driftwalk.track.detect.two_colour_detector import Disc, find_regions
 from driftwalk.track.types import Image, PixelToWorld
 
 

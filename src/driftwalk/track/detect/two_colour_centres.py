@@ -17,8 +17,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.arrays import Bools, Floats, Indices
-from driftwalk.track.detect.markers import Weights
+from driftwalk.core.arrays import Bools, Floats, Indices, Singles
 
 
 class CentrePolicy(NamedTuple):
@@ -71,7 +70,7 @@ class Measured:
 
 
 def weighted_centres(
-    cv2: Any, weights: list[Weights], start: Floats, *, diameter: float
+    cv2: Any, weights: list[Singles], start: Floats, *, diameter: float
 ) -> Measured:
     """Return the centres of two whole discs.
 
@@ -97,7 +96,7 @@ def weighted_centres(
     return Measured(centres, np.diag(variances), shares, float(uneven.max()) / diameter)
 
 
-def _centre(weight: Weights, start: Floats, reach: float) -> tuple[Floats, float]:
+def _centre(weight: Singles, start: Floats, reach: float) -> tuple[Floats, float]:
     """Return the centre of a disc, and the area over half of its height [px²]."""
     rows, columns = weight.shape
     column, row = start.tolist()
@@ -119,7 +118,7 @@ def _centre(weight: Weights, start: Floats, reach: float) -> tuple[Floats, float
     return np.array([column, row]), area
 
 
-def _variance(cv2: Any, weight: Weights, centre: Floats, reach: float) -> tuple[Floats, float]:
+def _variance(cv2: Any, weight: Singles, centre: Floats, reach: float) -> tuple[Floats, float]:
     """Return the variance of a disc's centre along columns and rows [px²], and how uneven it is.
 
     A disc looks the same when it is turned by half a turn about its centre: what differs is noise,
@@ -141,7 +140,7 @@ def _variance(cv2: Any, weight: Weights, centre: Floats, reach: float) -> tuple[
 
 
 @lru_cache(maxsize=64)
-def _window(half: int) -> tuple[Weights, Floats, npt.NDArray[np.complex64]]:
+def _window(half: int) -> tuple[Singles, Floats, npt.NDArray[np.complex64]]:
     """Return a round window, squares of distances along one side, and two harmonics, flat.
 
     The harmonics are the second and the third; both are of the form of a distance, so that they
@@ -201,7 +200,7 @@ _SWINGS: Final = np.radians(np.arange(-60.0, 60.1, 0.5))
 
 
 def outlined_centres(
-    weights: list[Weights], start: Floats, *, diameter: float, spacing: float
+    weights: list[Singles], start: Floats, *, diameter: float, spacing: float
 ) -> Measured | None:
     """Return the centres of two discs of which parts may be hidden.
 
@@ -247,7 +246,7 @@ def outlined_centres(
     return Measured(centres, covariance, shares)
 
 
-def _outline(weight: Weights, at: Floats, diameter: float) -> Floats:
+def _outline(weight: Singles, at: Floats, diameter: float) -> Floats:
     """Return where a colour's weight crosses half of its height, shape (n, 2)."""
     weight, near, corner = _around(weight, at, 1.2 * diameter)
     inside = weight[near & (weight > _OUTLINE.level)]
@@ -263,7 +262,7 @@ def _outline(weight: Weights, at: Floats, diameter: float) -> Floats:
     return np.asarray(found + corner)
 
 
-def _around(weight: Weights, at: Floats, reach: float) -> tuple[Weights, Bools, Floats]:
+def _around(weight: Singles, at: Floats, reach: float) -> tuple[Singles, Bools, Floats]:
     """Return a part of a patch, which of its pixels are near a place, and where it begins."""
     left, top = (max(math.floor(place - reach), 0) for place in at.tolist())
     # One more than needed, for outlines between the last pixel that is near and the next.
@@ -275,7 +274,7 @@ def _around(weight: Weights, at: Floats, reach: float) -> tuple[Weights, Bools, 
 
 
 def _part(
-    weight: Weights, level: float, row: Indices, column: Indices, step: tuple[int, int]
+    weight: Singles, level: float, row: Indices, column: Indices, step: tuple[int, int]
 ) -> Floats:
     """Return which part of the way from pixels to the next ones a level is reached."""
     low, high = weight[row, column], weight[row + step[0], column + step[1]]
@@ -377,7 +376,7 @@ def _swing_variance(
     return float(likely @ _SWINGS**2 / likely.sum())
 
 
-def _shares(weights: list[Weights], centres: Floats, diameter: float) -> Floats:
+def _shares(weights: list[Singles], centres: Floats, diameter: float) -> Floats:
     """Return how much of each disc is seen."""
     seen = []
     for weight, centre in zip(weights, centres, strict=True):

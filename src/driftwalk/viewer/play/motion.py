@@ -23,6 +23,7 @@ from driftwalk.comparison import (
     turning_angle_edges,
 )
 from driftwalk.conditions import recorded_camera
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.page import encode_array
 from driftwalk.schema import body_track
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-Floats = npt.NDArray[np.float64]
 
 INTERVAL_S: Final = 0.1
 """Time between the points of a step where there is no recording [s]."""

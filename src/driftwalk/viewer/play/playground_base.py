@@ -18,7 +18,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import DriftwalkError, InputError
-from driftwalk.core.text.json_text import json_value
+from driftwalk.core.text_files import json_value
 from driftwalk.page import encode_array
 from driftwalk.page.html import page_frame
 from driftwalk.page.parts import section

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
-from driftwalk.core.files.bounded import path_inside, text_of_name
 from driftwalk.core.files.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
 from driftwalk.core.files.shards import read_specification
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.text_files import path_inside, text_of_name
 from driftwalk.page.html import page_frame
 from driftwalk.page.parts import empty_section
 from driftwalk.schema.runs import RUN_KINDS, load_maker

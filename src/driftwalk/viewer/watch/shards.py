@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.files.bounded import path_inside
 from driftwalk.core.files.run_layout import RECORD_FILE, SHARD_FOLDER, run_file
 from driftwalk.core.files.shards import (
     SHARD_SUFFIX,
@@ -19,6 +18,7 @@ from driftwalk.core.files.shards import (
     read_specification,
     unpack_shard,
 )
+from driftwalk.core.text_files import path_inside
 
 _UNIT: Final = re.compile(r"(\d{8,12})-(\d{8,12})", re.ASCII)
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from driftwalk.core.errors import RunDirectoryError
-from driftwalk.core.files.bounded import path_inside
 from driftwalk.core.files.run_layout import complete_move, move_aside
 from driftwalk.core.files.rundir import RunDirectory
+from driftwalk.core.text_files import path_inside
 from driftwalk.sweep import grid, run_sweep
 
 SPECIFICATION = {"study": {"tank": {"diameter_m": 0.3}}, "seed": 1}

@@ -26,8 +26,8 @@ from driftwalk.flow.arena import outline_of
 from driftwalk.flow.grid import make_grid
 from driftwalk.likelihood.check import replicates
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
-from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.filter.series import body_of, layer_strengths, mode_amplitudes, series_of
+from driftwalk.likelihood.filter.parameters import Point, body_of
+from driftwalk.likelihood.filter.series import layer_strengths, mode_amplitudes, series_of
 from driftwalk.likelihood.fitted_modes import mode_variables, moving_fields, stored_frames
 from driftwalk.likelihood.law import flow_modes
 from driftwalk.likelihood.law.flow_modes import modes_at

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from fit_worlds import coarse_study, recording
+from unknown_names import unknown_names
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
@@ -16,7 +17,7 @@ from driftwalk.page.sections.fit import fit_sections
 from driftwalk.plot import residuals as plot_residual_map
 from driftwalk.schema.answers.fit import BY_CELL, residuals_of
 from driftwalk.schema.answers.verdict import Verdict, stored_verdict
-from driftwalk.schema.check import check_dataset, unknown_names
+from driftwalk.schema.check import check_dataset
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 
 SECONDS = 120.0

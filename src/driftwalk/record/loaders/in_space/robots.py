@@ -20,8 +20,7 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError, damaged_as
-from driftwalk.core.files.bounded import MIB, read_bounded
-from driftwalk.core.text.json_text import MOST_LEVELS
+from driftwalk.core.text_files import MIB, MOST_LEVELS, read_bounded
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.loaders.plain import described
 from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions, TableLayout

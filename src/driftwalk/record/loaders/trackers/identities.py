@@ -21,8 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError, damaged_as, naming_its_file
-from driftwalk.core.files.bounded import MIB, read_bounded
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text_files import MIB, parse_json, read_bounded
 from driftwalk.record.cleaning.clean import number_codes, split_bodies
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.containers import (

@@ -1,4 +1,4 @@
-"""Read a flow field from a file, and recognise the program that wrote it.
+"""Flow fields in files: NetCDF with CF units, plain CSV, and those of PIV programs.
 
 Recordings have the same file endings as flow fields.
 """
@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.files.bounded import text_of_name
-from driftwalk.flow.arena import Outline, outline_of, read_arena
-from driftwalk.flow.fill import fill_velocity
+from driftwalk.core.files.atomic import atomic_path, require_target, write_atomic
+from driftwalk.core.text_files import text_of_name
+from driftwalk.flow.arena import Outline, outline_of
+from driftwalk.flow.cell_means import fill_velocity
 from driftwalk.flow.grid import Grid, grid_rows
 from driftwalk.flow.readers import pivlab, text
 from driftwalk.flow.readers.columns import FIELD, column_of, holds_field, names_a_time
@@ -28,12 +30,12 @@ from driftwalk.flow.readers.text import Layout, TextOptions
 from driftwalk.flow.readers.units import FieldOptions, RawField, raw_to_si, y_words
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
 from driftwalk.schema.check import check_contents, kind_name
-from driftwalk.schema.stores.netcdf import is_netcdf, kind_of_file, open_netcdf
+from driftwalk.schema.stores.netcdf import is_netcdf, kind_of_file, netcdf_bytes, open_netcdf
+from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 _ONLY_TEXT: Final = "`columns`, `header_line` and `delimiter` are for text, and this is {}"
 
 
@@ -173,11 +175,11 @@ def _warning(notes: list[str]) -> dict[str, str]:
 
 
 def _new_field(
-    x: Array,
-    y: Array,
-    velocity: Array,
+    x: Floats,
+    y: Floats,
+    velocity: Floats,
     *,
-    time: Array | None = None,
+    time: Floats | None = None,
     arena: Mapping[str, Any] | str | None,
     attrs: dict[str, Any],
 ) -> xr.Dataset:
@@ -221,8 +223,8 @@ def _new_field(
 
 
 def _fill(
-    grid: Grid, velocity: Array, known: npt.NDArray[np.bool_], outline: Outline | None
-) -> Array:
+    grid: Grid, velocity: Floats, known: npt.NDArray[np.bool_], outline: Outline | None
+) -> Floats:
     return velocity if known.all() else fill_velocity(grid, velocity, known=known, outline=outline)
 
 
@@ -336,3 +338,65 @@ def _fills_a_grid(path: Path) -> bool:
     except InputError:
         return False
     return True
+
+
+CONVENTIONS = "CF-1.11"
+
+
+def save_flow(flow: xr.Dataset, path: str | PathLike[str], *, existing: str = "error") -> Path:
+    """Write a flow field as NetCDF (``.nc``) or CSV (``.csv``), by the name's ending.
+
+    NetCDF holds everything, follows the CF conventions, and opens in plain xarray. CSV has the
+    columns x, y, u, v in SI, a row per node, x fastest, with as many digits as it takes to read the
+    same numbers back; counts, errors, flags and attributes are lost.
+
+    Parameters
+    ----------
+    flow : xarray.Dataset
+        A `flow_field`.
+    path : path-like
+        Where to write. The file appears whole or not at all.
+    existing : {"error", "replace"}
+        Behaviour if the file exists already.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        When the file exists, its ending is neither ``.nc`` nor ``.csv``, or the field has frames
+        and is to be CSV.
+    RunDirectoryError
+        When the place cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from driftwalk.flow import uniform_flow
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_flow(uniform_flow(0.1, 0.0), f"{folder}/flow.nc").name
+    'flow.nc'
+    """
+    check_flow_field(flow)
+    target = Path(path)
+    require_target(target, existing=existing, endings=(".nc", ".csv"))
+    if target.suffix.lower() == ".csv":
+        _write_csv(flow, target)
+        return target
+    write_atomic(target, netcdf_bytes(flow.assign_attrs(Conventions=CONVENTIONS)))
+    return target
+
+
+def _write_csv(flow: xr.Dataset, path: Path) -> None:
+    import pandas as pd
+
+    if "time" in flow["u"].dims:
+        raise InputError(f"{path}: a flow field that changes in time is kept as .nc")
+    x, y = np.meshgrid(flow["x"].values, flow["y"].values)
+    columns = {"x": x, "y": y, "u": flow["u"].values, "v": flow["v"].values}
+    table = pd.DataFrame({name: values.ravel() for name, values in columns.items()})
+    with atomic_path(path) as temporary:
+        table.to_csv(temporary, index=False)

@@ -11,7 +11,7 @@ import pytest
 import driftwalk as dw
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model import Block, parse_study
-from driftwalk.model.bodies import BODIES, Measures, RigidBody, rigid_body
+from driftwalk.model.rigid_bodies import BODIES, Measures, RigidBody, rigid_body
 
 A = 0.03
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.memoize import KEPT, remembered
+from driftwalk.core.arrays import MOST_REMEMBERED, remembered
 
 Floats = npt.NDArray[np.float64]
 
@@ -43,9 +43,9 @@ def test_the_oldest_results_are_forgotten() -> None:
         calls.append(1)
         return float(array)
 
-    for number in range(KEPT + 1):
+    for number in range(MOST_REMEMBERED + 1):
         value(np.array(float(number)))
-    value(np.array(float(KEPT)))
-    assert len(calls) == KEPT + 1
+    value(np.array(float(MOST_REMEMBERED)))
+    assert len(calls) == MOST_REMEMBERED + 1
     value(np.array(0.0))
-    assert len(calls) == KEPT + 2
+    assert len(calls) == MOST_REMEMBERED + 2

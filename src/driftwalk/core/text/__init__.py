@@ -1,1 +1,0 @@
-"""JSON and TOML read within bounds, and names in messages."""
