@@ -77,6 +77,7 @@ public:
     holds_value_ = ks_take<std::uint8_t>(scratch, most_bins_);
     crowd_of_ = ks_take<std::uint16_t>(scratch, most_bins_);
     bucket_ = ks_take<std::uint16_t>(scratch, most_bins_);
+    leaf_ = ks_take<std::int32_t>(scratch, most_bins_);
     split_ = ks_take<KsSplit>(scratch, most_bins_);
     crowd_ = ks_take<Crowd>(scratch, most_bins_);
     sample_ = ks_take<double>(scratch, all / least_ + 1);
@@ -88,9 +89,6 @@ public:
   // False where bins are crowded still when they were cut six times, or where bins run out.
   bool cut(const double* const values[2], KsBuckets& buckets) {
     constexpr int most_rounds = 6;
-    buckets_ = &buckets;
-    buckets.count = 0;
-    buckets.size[0][0] = buckets.size[1][0] = 0;
     if (!deal(values)) {
       return false;
     }
@@ -108,12 +106,11 @@ public:
       }
       deal_crowds(values);
     }
+    leaves_ = 0;
     for (std::int32_t bin = 0; bin < first_bins_; ++bin) {
-      join(bin);
+      list_leaves(bin);
     }
-    if (filled() > 0) {
-      close(false);
-    }
+    join_leaves(buckets);
     for (std::int64_t i = 0; i < n_[0] + n_[1]; ++i) {
       buckets.of_point[i] = bucket_[bin_[i]];
     }
@@ -303,34 +300,48 @@ private:
     }
   }
 
-  // Bins in order get their buckets; many points of one number have a bucket of their own.
-  void join(std::int32_t bin) {
-    if (crowd_of_[bin] != 0) {
-      const Crowd& crowd = crowd_[crowd_of_[bin] - 1];
-      for (std::int32_t part = crowd.begin; part < crowd.end; ++part) {
-        join(part);
-      }
+  // The bins that are not cut, in order.
+  void list_leaves(std::int32_t bin) {
+    if (crowd_of_[bin] == 0) {
+      leaf_[leaves_++] = bin;
       return;
     }
-    const bool is_value = holds_value_[bin] != 0 && count(bin) > least_;
-    if ((is_value || count(bin) > 2 * least_) && filled() > 0) {
-      close(false);
-    }
-    bucket_[bin] = std::uint16_t(buckets_->count);
-    buckets_->size[0][buckets_->count] += counts_[0][bin];
-    buckets_->size[1][buckets_->count] += counts_[1][bin];
-    if (filled() >= least_) {
-      close(is_value);
+    const Crowd& crowd = crowd_[crowd_of_[bin] - 1];
+    for (std::int32_t part = crowd.begin; part < crowd.end; ++part) {
+      list_leaves(part);
     }
   }
 
-  // The bucket that is being filled comes after those that are counted.
-  std::int32_t filled() const {
-    return buckets_->size[0][buckets_->count] + buckets_->size[1][buckets_->count];
-  }
-  void close(bool is_value) {
-    buckets_->is_value[buckets_->count++] = is_value;
-    buckets_->size[0][buckets_->count] = buckets_->size[1][buckets_->count] = 0;
+  // Neighbouring bins share a bucket; many points of one number have a bucket of their own.
+  void join_leaves(KsBuckets& buckets) {
+    std::int64_t bucket = 0;
+    std::int32_t size[2] = {0, 0};
+    const auto close = [&](bool is_value) {
+      buckets.size[0][bucket] = size[0];
+      buckets.size[1][bucket] = size[1];
+      buckets.is_value[bucket++] = is_value;
+      size[0] = size[1] = 0;
+    };
+    const std::int32_t least = least_;
+    for (std::int32_t k = 0, leaves = leaves_; k < leaves; ++k) {
+      const std::int32_t bin = leaf_[k];
+      const std::int32_t own[2] = {counts_[0][bin], counts_[1][bin]};
+      const std::int32_t all = own[0] + own[1];
+      const bool is_value = holds_value_[bin] != 0 && all > least;
+      if ((is_value || all > 2 * least) && size[0] + size[1] > 0) {
+        close(false);
+      }
+      bucket_[bin] = std::uint16_t(bucket);
+      size[0] += own[0];
+      size[1] += own[1];
+      if (size[0] + size[1] >= least) {
+        close(is_value);
+      }
+    }
+    if (size[0] + size[1] > 0) {
+      close(false);
+    }
+    buckets.count = bucket;
   }
 
   static constexpr double largest = 0x1.fffffffffffffp+1023;
@@ -338,7 +349,6 @@ private:
   std::int32_t least_;
   std::int32_t even_bins_;
   std::int32_t most_bins_;
-  KsBuckets* buckets_ = nullptr;
   // By bin.
   std::int32_t bins_ = 0;
   std::int32_t first_bins_ = 0; // of the even scale
@@ -346,6 +356,8 @@ private:
   std::uint8_t* holds_value_; // 1 where all its numbers are equal
   std::uint16_t* crowd_of_;   // from 1; 0 where it is none
   std::uint16_t* bucket_;
+  std::int32_t leaves_ = 0;      // bins that are not cut
+  std::int32_t* leaf_;           // in order
   KsSplit* split_;               // where it is a crowd
   std::int32_t first_crowd_ = 0; // of the newest bins
   std::int32_t crowds_ = 0;

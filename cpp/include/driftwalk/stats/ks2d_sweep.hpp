@@ -98,7 +98,7 @@ constexpr std::int64_t ks_bounded_to = std::int64_t(1) << 23;
 
 constexpr std::int64_t ks_bounded_bytes(std::int64_t n) {
   const KsBucketSizes buckets = ks_bucket_sizes(n);
-  return 80 * n + 88 * buckets.most_bins + 96 * buckets.most + 16 * 1024;
+  return 80 * n + 92 * buckets.most_bins + 96 * buckets.most + 16 * 1024;
 }
 
 // False, with nothing found, where the bounds do not pay; the sweep has to be run.

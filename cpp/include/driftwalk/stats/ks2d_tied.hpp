@@ -23,9 +23,10 @@ public:
   // Equal for equal values.
   std::uint32_t hash() const { return std::uint32_t(bits_ >> hash_at); }
   // The point's number among those of sample 1, which has n1 points, and of sample 2.
-  double value(const double* const values[2], std::int64_t n1) const {
+  double value(const double* const values[2], std::int64_t n1) const { return *place(values, n1); }
+  const double* place(const double* const values[2], std::int64_t n1) const {
     const std::int64_t i = point();
-    return i < n1 ? values[0][i] : values[1][i - n1];
+    return i < n1 ? values[0] + i : values[1] + (i - n1);
   }
 
   static constexpr int hash_bits = 25;
@@ -81,6 +82,7 @@ private:
     const KsRecord* const records = axis.records;
     std::int32_t* const before = before_;
     const std::int64_t n1 = samples_.n[0];
+    std::int32_t count = 0;
     for (std::int64_t b = 0; b < buckets.count; ++b) {
       const std::int32_t begin = buckets.begin[b];
       const std::int32_t end = buckets.begin[b + 1];
@@ -90,8 +92,15 @@ private:
         }
         continue;
       }
+      // Where many met another, the numbers of the next bucket will be asked for: they lie far
+      // apart.
+      if (2 * count > end - begin && b + 1 < buckets.count && buckets.is_value[b + 1] == 0) {
+        for (std::int32_t k = end; k < buckets.begin[b + 2]; ++k) {
+          __builtin_prefetch(records[k].place(values, n1));
+        }
+      }
       // Points that met another, without a branch: in samples with ties no one foretells which do.
-      std::int32_t count = 0;
+      count = 0;
       for (std::int32_t k = begin; k < end; ++k) {
         std::int32_t& place = last[records[k].hash() >> shift];
         const std::int32_t other = place;
