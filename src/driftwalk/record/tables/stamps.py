@@ -17,6 +17,8 @@ Texts = npt.NDArray[np.bytes_]
 
 SECOND_NS: Final = 1_000_000_000
 DAY_NS: Final = 86_400 * SECOND_NS
+STAMP_BYTES: Final = 201
+"""Bytes of a text in which no stamp ends, of which one has some 40; chosen by hand."""
 NO_TIME: Final = int(np.iinfo(np.int64).min)
 """In place of the nanoseconds of a row without a time."""
 
@@ -121,19 +123,19 @@ class StampReader:
 
         Parameters
         ----------
-        texts : array of str, shape (n,)
-            Time stamps without blanks around them, or words for a missing one.
+        texts : array of str or bytes, shape (n,)
+            Time stamps without blanks around them, or words for a missing one; bytes are UTF-8, and
+            of a longer text at least the first `STAMP_BYTES`.
 
         Raises
         ------
         RowError
             At a text that is no stamp, or of another kind than the first.
         """
-        # One long text would make an array as wide as it of all; a time stamp has some 40 letters.
-        wrong = (row for row, text in enumerate(texts) if len(text) > 200 or not text.isascii())
-        if (row := next(wrong, None)) is not None:
-            raise RowError(row, f"'{texts[row]:.40}' is no time stamp")
-        ascii_texts = np.asarray(texts, dtype=object).astype("S")
+        if texts.dtype.kind != "S":
+            starts = [text[:STAMP_BYTES].encode("utf-8", "replace") for text in texts.tolist()]
+            texts = np.array(starts, dtype="S")
+        ascii_texts = _ascii(np.ascontiguousarray(texts))
         found = np.full(ascii_texts.size, NO_TIME, dtype=np.int64)
         for rows in _of_one_shape(ascii_texts):
             first = ascii_texts[rows[0]].decode()
@@ -176,12 +178,33 @@ def how_to_write(text: str) -> str:
     return ": it can be read in several ways, so write it as 2024-05-31T13:30:00 or 13:30:00"
 
 
+def _ascii(texts: Texts) -> Texts:
+    """Return an array that is no wider than its longest text, empty where a word is not ASCII.
+
+    Raises
+    ------
+    RowError
+        At a text that is too long, or no ASCII and no word for a missing time.
+    """
+    letters = texts.view(np.uint8).reshape(texts.size, -1)
+    highest = letters.max(axis=0, initial=0)
+    if highest.max() > 127 or highest[STAMP_BYTES - 1 :].any():
+        texts = texts.copy()
+        wrong = (letters > 127).any(axis=1) | letters[:, STAMP_BYTES - 1 :].any(axis=1)
+        for row in np.flatnonzero(wrong).tolist():
+            text = texts[row].decode("utf-8", "ignore")
+            if text not in MISSING:
+                raise RowError(row, f"'{text:.40}' is no time stamp")
+            texts[row] = b""
+    return texts.astype(f"S{1 + np.flatnonzero(highest).max(initial=0)}")
+
+
 def _of_one_shape(texts: Texts) -> list[Integers]:
     """Return the rows of each class of texts that differ in their digits alone, as they come."""
     if not texts.size:
         return []
     letters = texts.view(np.uint8).reshape(texts.size, -1)
-    digits = (letters >= ord("0")) & (letters <= ord("9"))
+    digits = letters - np.uint8(ord("0")) < 10  # those before "0" are the largest numbers
     shapes = np.ascontiguousarray(np.where(digits, np.uint8(ord("0")), letters))
     if (shapes == shapes[0]).all():
         return [np.arange(texts.size)]
