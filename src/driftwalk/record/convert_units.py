@@ -18,7 +18,6 @@ from driftwalk.record.raw import (
     CLOCK_UNITS,
     LENGTH_UNITS,
     Array,
-    RawBody,
     RawRecording,
     ReadOptions,
 )
@@ -97,8 +96,8 @@ def convert_units(
     *,
     y_axis: str | None = None,
     tank: str | None = None,
-) -> tuple[list[RawBody], dict[str, object]]:
-    """Return the bodies in s, m and rad with y up, and the attributes that say what was done.
+) -> dict[str, object]:
+    """Convert the bodies to s, m and rad with y up; return the attributes that say what was done.
 
     The arrays of `raw` are converted in place, so that a large recording is held once.
 
@@ -146,15 +145,13 @@ def convert_units(
         attrs["metres_per_pixel"] = scale
     clocks = _convert_clocks(raw, ticks, attrs)
     turn = ANGLE_UNITS[raw.angle_unit] * (-1.0 if flip_theta else 1.0)
-    bodies = []
     for body in raw.bodies:
-        x = np.multiply(body.x, scale, out=_writable(body.x))
-        y = np.multiply(body.y, -scale if flip else scale, out=_writable(body.y))
-        theta = body.theta
-        if theta is not None and turn != 1.0:
-            theta = np.multiply(theta, turn, out=_writable(theta))
-        bodies.append(RawBody(body.name, clocks[id(body.clock)], x, y, theta, extra=body.extra))
-    return bodies, attrs
+        body.clock = clocks[id(body.clock)]
+        body.x = np.multiply(body.x, scale, out=_writable(body.x))
+        body.y = np.multiply(body.y, -scale if flip else scale, out=_writable(body.y))
+        if body.theta is not None and turn != 1.0:
+            body.theta = np.multiply(body.theta, turn, out=_writable(body.theta))
+    return attrs
 
 
 def scale_wanted(length_unit: str, bare_is_si: bool, options: ReadOptions) -> str:

@@ -285,7 +285,9 @@ class _Collected:
         self._path = path
         kinds = dict.fromkeys(layout.numbers, np.float64) | dict.fromkeys(layout.texts, np.int32)
         kinds |= dict.fromkeys(layout.stamps[:1], np.float64)
-        self._columns = {column: np.empty(0, dtype=kind) for column, kind in kinds.items()}
+        self._columns: dict[int, npt.NDArray[Any]] = {
+            column: np.empty(0, dtype=kind) for column, kind in kinds.items()
+        }
         """Column to its values, with room for those to come."""
         self._room = 0
         self._labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}

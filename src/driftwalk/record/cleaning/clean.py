@@ -123,7 +123,7 @@ def split_bodies(rows: RawBody, codes: Codes, labels: Sequence[str]) -> list[Raw
     Parameters
     ----------
     rows : RawBody
-        The rows of all bodies.
+        The rows of all bodies; it is left without them where there are several.
     codes : array of int32, shape (n,)
         Index of each row's body in `labels`.
     labels : sequence of str
@@ -138,7 +138,7 @@ def split_bodies(rows: RawBody, codes: Codes, labels: Sequence[str]) -> list[Raw
     if len(labels) == 1:
         return [replace(rows, name=labels[0])]
     places = zip(labels, rows_of_bodies(codes, number=len(labels)), strict=True)
-    return [replace(rows.take(at), name=name) for name, at in places if at.size]
+    return rows.split([(name, at) for name, at in places if at.size])
 
 
 def rows_of_bodies(codes: Codes, *, number: int = 0) -> list[Integers]:

@@ -117,12 +117,13 @@ def _marks_of(body: RawBody) -> list[tuple[str, str]]:
     square = squared_steps(x, y)
     marks = []
     with np.errstate(over="ignore"):
-        near, far = (square > (least * usual) ** 2 for least in (MARK.far_whole, MARK.far))
+        least, whole = ((steps * usual) ** 2 for steps in (MARK.far, MARK.far_whole))
+    near = square > whole
     # A place that is left and reached by long steps alone; noise has no such place.
-    if 0 < near.sum() <= x.size // 2:
-        marks += _far_places(x, y, near, far)
+    if 0 < np.count_nonzero(near) <= x.size // 2:
+        marks += _far_places(x, y, near, square > least)
     still = square == 0.0
-    if 0.0 < still.mean() <= 1.0 - MARK.moving:
+    if 0 < np.count_nonzero(still) <= (1.0 - MARK.moving) * still.size:
         runs, rows = _held_runs(square, still, usual)
         if runs > 1 or rows > MARK.held:
             times = "once" if runs == 1 else f"{runs} times"

@@ -35,13 +35,22 @@ class PlausibilityPolicy(NamedTuple):
 PLAUSIBLE: Final = PlausibilityPolicy()
 
 
-def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
+def usual_intervals(bodies: list[RawBody]) -> list[float]:
+    """Return the median interval between the samples of each body that has several."""
+    # The differences are the median's own to sort: a long recording is not to be held twice.
+    steps = (np.diff(body.clock) for body in bodies if body.clock.size > 1)
+    return [float(np.median(step, overwrite_input=True)) for step in steps]
+
+
+def plausibility_warnings(bodies: list[RawBody], intervals: list[float]) -> list[str]:
     """Return what looks wrong about extent and speed: most often a unit or a scale.
 
     Parameters
     ----------
     bodies : list of RawBody
         In SI units.
+    intervals : list of float
+        As `usual_intervals` returns them [s].
     """
     if not any(np.isfinite(body.x).any() for body in bodies):
         return ["no row holds a position"]
@@ -53,7 +62,7 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
     elif only or extent > PLAUSIBLE.largest_extent_m:
         span = f"{only}{extent:.3g} m"
         warnings.append(f"the positions span {span}: is the unit, or the scale, right?")
-    warnings += _clock_warnings(bodies)
+    warnings += _clock_warnings(bodies, intervals)
     speeds = [0.0]
     for body in bodies:
         t, x, y = (np.diff(values[:10_000]) for values in (body.clock, body.x, body.y))
@@ -74,12 +83,11 @@ def span_of(series: Sequence[Array]) -> float:
     return high - low if high >= low else 0.0
 
 
-def _clock_warnings(bodies: list[RawBody]) -> list[str]:
-    clocks = [body.clock for body in bodies if body.clock.size > 1]
-    if not clocks:
+def _clock_warnings(bodies: list[RawBody], intervals: list[float]) -> list[str]:
+    if not intervals:
         return []
-    last = max(float(clock[-1] - clock[0]) for clock in clocks)
-    shortest = min(float(np.median(np.diff(clock), overwrite_input=True)) for clock in clocks)
+    last = max(float(body.clock[-1] - body.clock[0]) for body in bodies if body.clock.size > 1)
+    shortest = min(intervals)
     if last > PLAUSIBLE.longest_recording_s:
         return [f"the recording lasts {last:.3g} s: is the unit of its clock right?"]
     if shortest < PLAUSIBLE.shortest_interval_s:
@@ -99,12 +107,15 @@ def angle_warnings(raw: RawRecording) -> list[str]:
     """
     if not raw.bare_angle or raw.angle_unit != "rad":
         return []
-    known = [body.theta[np.isfinite(body.theta)] for body in raw.bodies if body.theta is not None]
-    for theta in known:
+    for column in (body.theta for body in raw.bodies if body.theta is not None):
+        known = np.isfinite(column)
+        theta = column if known.all() else column[known]
         with np.errstate(over="ignore"):  # a leap may be infinite
-            steps = np.abs(np.diff(theta))
-        fast = steps.size > 1 and np.median(steps) > PLAUSIBLE.usual_step_rad
+            steps = np.diff(theta)
+        np.abs(steps, out=steps)
         leaps = bool((steps > PLAUSIBLE.leap_rad).any())
+        usual = np.median(steps, overwrite_input=True) if steps.size > 1 else 0.0
+        fast = usual > PLAUSIBLE.usual_step_rad
         if theta.size and (abs(theta[0]) > 6.2832 or leaps or fast):
             low, high = float(theta.min()), float(theta.max())
             return [

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Codes, Floats, Integers
-from driftwalk.record.raw import MISSING, Array, RawBody
+from driftwalk.record.raw import MISSING, Array
 
 Ticks = Integers
 Texts = npt.NDArray[np.bytes_]
@@ -314,29 +314,24 @@ def moment_text(nanoseconds: int, calendar: str) -> str:
     return f"{text}{decimals}{'Z' if calendar == UTC else ''}"
 
 
-def count_days(bodies: list[RawBody], clock: Array, codes: Codes | None) -> list[RawBody]:
-    """Return bodies whose times of day have a day more after each midnight.
+def count_days(clock: Array, codes: Codes | None) -> Array:
+    """Return times of day with a day more after each midnight.
 
     Rows of several bodies that take turns are in the order of their times: midnight is the same row
     for all. Where bodies stand one below the other, each has its own midnights.
 
     Parameters
     ----------
-    bodies : list of RawBody
-        Their clocks in nanoseconds since midnight.
     clock : array, shape (n,)
-        The clock of all rows.
+        The clock of all rows, in nanoseconds since midnight.
     codes : array of int32, shape (n,), optional
-        Index of each row's body, in the order of the bodies; None: all share the clock.
+        Index of each row's body, from 0 on; None: all share the clock.
     """
-    if codes is None or len(bodies) == 1:
-        clocks = [counted_on(clock, DAY_NS)] * len(bodies)
-    elif int((codes[1:] != codes[:-1]).sum()) < len(bodies):
-        clocks = [counted_on(body.clock, DAY_NS) for body in bodies]
-    else:
-        counted = counted_on(clock, DAY_NS)
-        clocks = [counted[codes == code] for code in np.unique(codes)]
-    return [replace(body, clock=own) for body, own in zip(bodies, clocks, strict=True)]
+    if codes is None:
+        return counted_on(clock, DAY_NS)
+    changes = np.flatnonzero(codes[1:] != codes[:-1]) + 1
+    parts = [clock] if changes.size > codes.max() else np.split(clock, changes)
+    return np.concatenate([counted_on(part, DAY_NS) for part in parts])
 
 
 def counted_on(clock: Array, period: float) -> Array:
