@@ -26,13 +26,7 @@ from driftwalk.core.arrays import Bools, Codes, Integers
 from driftwalk.core.errors import DAMAGED, FormatError, naming_its_file
 from driftwalk.record.bad_row import check_lines, decoded_line
 from driftwalk.record.raw import MISSING, NAMELESS, Array, TableLayout
-from driftwalk.record.tables.stamps import (
-    STAMP_BYTES,
-    RowError,
-    StampReader,
-    calendar_of,
-    clock_of_stamps,
-)
+from driftwalk.record.tables.stamps import RowError, StampReader, calendar_of, clock_of_stamps
 
 UTF16: Final = "UTF-16"
 """Encoding of "Unicode text", which begins with a byte order mark."""
@@ -114,8 +108,6 @@ class TextPolicy(NamedTuple):
 TEXT: Final = TextPolicy()
 
 _BUFFER: Final = 1 << 20
-_STAMP: Final = f"S{STAMP_BYTES}"
-"""Type of a column of time stamps: pandas makes no object of each of its texts."""
 GZIP_MAGIC = b"\x1f\x8b"
 BOM = b"\xef\xbb\xbf"
 
@@ -283,12 +275,9 @@ class _Collected:
     def __init__(self, layout: TableLayout, path: Path) -> None:
         self._layout = layout
         self._path = path
-        kinds = dict.fromkeys(layout.numbers, np.float64) | dict.fromkeys(layout.texts, np.int32)
-        kinds |= dict.fromkeys(layout.stamps[:1], np.float64)
-        self._columns: dict[int, npt.NDArray[Any]] = {
-            column: np.empty(0, dtype=kind) for column, kind in kinds.items()
-        }
-        """Column to its values, with room for those to come."""
+        # With room for the values to come.
+        self._numbers = dict.fromkeys((*layout.numbers, *layout.stamps[:1]), np.empty(0))
+        self._codes = dict.fromkeys(layout.texts, np.empty(0, dtype=np.int32))
         self._room = 0
         self._labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
         self._stamps = {column: StampReader() for column in layout.stamps}
@@ -311,13 +300,13 @@ class _Collected:
                 if self._origin:
                     whole = values.dtype.kind == "i"
                     values = values - (self._origin if whole else float(self._origin))
-            self._columns[column][rows] = values
+            self._numbers[column][rows] = values
         for column, seen in self._labels.items():
             local, texts = frame[column].fillna("").astype(str).factorize()
             index = [seen.setdefault(str(text), len(seen)) for text in texts]
-            self._columns[column][rows] = np.array(index, dtype=np.int32)[local]
+            self._codes[column][rows] = np.array(index, dtype=np.int32)[local]
         if self._stamps:
-            self._columns[self._layout.stamps[0]][rows] = self._clock(frame, block, line)
+            self._numbers[self._layout.stamps[0]][rows] = self._clock(frame, block, line)
         self._rows = rows.stop
 
     def _make_room(self, rows: int, size: int) -> None:
@@ -325,20 +314,22 @@ class _Collected:
         # Memory that is never written to is never taken. A packed file has more rows than that.
         expected = rows + rows * self._path.stat().st_size // size
         self._room = max(expected, self._rows + rows, 2 * self._room)
-        for column, values in self._columns.items():
-            self._columns[column] = np.empty(self._room, dtype=values.dtype)
-            self._columns[column][: self._rows] = values[: self._rows]
+        columns: dict[int, npt.NDArray[Any]]
+        for columns in (self._numbers, self._codes):
+            for column, values in columns.items():
+                columns[column] = np.empty(self._room, dtype=values.dtype)
+                columns[column][: self._rows] = values[: self._rows]
 
     def table(self) -> Table:
         """Return what was read."""
         if not self._rows:
             raise FormatError("holds no rows of data")
-        for values in self._columns.values():
+        for values in (*self._numbers.values(), *self._codes.values()):
             values.resize(self._rows, refcheck=False)
         return Table(
             rows=self._rows,
-            numbers={at: one for at, one in self._columns.items() if at not in self._labels},
-            codes={at: self._columns[at] for at in self._labels},
+            numbers=self._numbers,
+            codes=self._codes,
             labels={column: list(seen) for column, seen in self._labels.items()},
             clock_origin=self._origin or 0,
             calendar=calendar_of([*self._stamps.values()]),
@@ -368,7 +359,7 @@ class _Collected:
 
     def _only_whole(self) -> bool:
         """Whether no number so far has decimals."""
-        known = [self._columns[at][: self._rows] for at in self._layout.numbers]
+        known = [self._numbers[at][: self._rows] for at in self._layout.numbers]
         return not any((one[np.isfinite(one)] % 1.0 != 0.0).any() for one in known)
 
     def _clock(self, frame: Any, block: bytes, line: int) -> Array:
@@ -376,7 +367,7 @@ class _Collected:
         try:
             ticks = []
             for column, reader in self._stamps.items():
-                ticks.append(reader.read(frame[column].to_numpy(dtype=_STAMP)))
+                ticks.append(reader.read(frame[column].to_numpy(dtype=reader.dtype)))
             column = self._layout.stamps[0]
             clock, self._origin = clock_of_stamps(ticks, self._origin)
         except RowError as error:
@@ -452,7 +443,8 @@ def _parse(block: bytes, layout: TableLayout, *, line: int, decimal: str) -> Any
             header=None,
             names=list(range(width)),
             usecols=used,
-            dtype=dict.fromkeys(layout.texts, str) | dict.fromkeys(layout.stamps, _STAMP),
+            dtype=dict.fromkeys(layout.texts, str)
+            | dict.fromkeys(layout.stamps, StampReader.dtype),
             decimal=decimal,
             sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
             na_values=missing,

@@ -205,20 +205,20 @@ def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
         Names the body and the number.
     """
     for body in bodies:
-        for name, values in (("x", body.x), ("y", body.y)):
-            _refuse_beyond(body, name, values, EXTENT.farthest_m / scale)
-        known = [np.abs(one).max(where=np.isfinite(one), initial=0.0) for one in (body.x, body.y)]
-        if 0.0 < max(known) < EXTENT.nearest_m / scale:
+        places = (("x", body.x), ("y", body.y))
+        reach = max(_farthest(body, *one, EXTENT.farthest_m / scale) for one in places)
+        if 0.0 < reach < EXTENT.nearest_m / scale:
             raise InputError(
-                f"body '{body.name}' has no position that is further than {max(known):.3g} from "
+                f"body '{body.name}' has no position that is further than {reach:.3g} from "
                 "the origin, in the file's unit: no camera sees that; are these the right columns, "
                 "and is the unit right (`length_unit`)?"
             )
         if body.theta is not None:
-            _refuse_beyond(body, "angle", body.theta, EXTENT.largest_angle)
+            _farthest(body, "angle", body.theta, EXTENT.largest_angle)
 
 
-def _refuse_beyond(body: RawBody, name: str, values: Array, most: float) -> None:
+def _farthest(body: RawBody, name: str, values: Array, most: float) -> float:
+    """Return how far from zero some numbers are at most; refuse those beyond a limit."""
     known = np.isfinite(values)
     ends = [float(end(where=known, initial=0.0)) for end in (values.min, values.max)]
     number = max(ends, key=abs)
@@ -227,3 +227,4 @@ def _refuse_beyond(body: RawBody, name: str, values: Array, most: float) -> None
             f"body '{body.name}' has {number:.3g} as {name}, which cannot be one: is the file "
             "damaged? Leave the field empty, or write nan, where nothing was measured"
         )
+    return abs(number)

@@ -17,8 +17,8 @@ Texts = npt.NDArray[np.bytes_]
 
 SECOND_NS: Final = 1_000_000_000
 DAY_NS: Final = 86_400 * SECOND_NS
-STAMP_BYTES: Final = 201
-"""Bytes of a text in which no stamp ends, of which one has some 40; chosen by hand."""
+_BYTES: Final = 201
+"""More bytes than a time stamp has, of some 40 as a rule; chosen by hand."""
 NO_TIME: Final = int(np.iinfo(np.int64).min)
 """In place of the nanoseconds of a row without a time."""
 
@@ -106,6 +106,9 @@ class StampReader:
     The first stamp decides the kind, and whether there is a zone; those after it have to agree.
     """
 
+    dtype: Final = f"S{_BYTES}"
+    """Type of a column of stamps in pandas, which then makes no object of each of them."""
+
     def __init__(self, *, zoned: bool = False) -> None:
         self.kind = ""
         """``MOMENT`` or ``OF_DAY``, ``""`` as long as there was no stamp."""
@@ -125,7 +128,7 @@ class StampReader:
         ----------
         texts : array of str or bytes, shape (n,)
             Time stamps without blanks around them, or words for a missing one; bytes are UTF-8, and
-            of a longer text at least the first `STAMP_BYTES`.
+            of a longer text no more than `dtype` holds.
 
         Raises
         ------
@@ -133,7 +136,7 @@ class StampReader:
             At a text that is no stamp, or of another kind than the first.
         """
         if texts.dtype.kind != "S":
-            starts = [text[:STAMP_BYTES].encode("utf-8", "replace") for text in texts.tolist()]
+            starts = [text[:_BYTES].encode("utf-8", "replace") for text in texts.tolist()]
             texts = np.array(starts, dtype="S")
         ascii_texts = _ascii(np.ascontiguousarray(texts))
         found = np.full(ascii_texts.size, NO_TIME, dtype=np.int64)
@@ -179,7 +182,7 @@ def how_to_write(text: str) -> str:
 
 
 def _ascii(texts: Texts) -> Texts:
-    """Return an array that is no wider than its longest text, empty where a word is not ASCII.
+    """Return texts in an array as wide as the longest of them; a word that is no ASCII is empty.
 
     Raises
     ------
@@ -188,9 +191,9 @@ def _ascii(texts: Texts) -> Texts:
     """
     letters = texts.view(np.uint8).reshape(texts.size, -1)
     highest = letters.max(axis=0, initial=0)
-    if highest.max() > 127 or highest[STAMP_BYTES - 1 :].any():
+    if highest.max() > 127 or highest[_BYTES - 1 :].any():
         texts = texts.copy()
-        wrong = (letters > 127).any(axis=1) | letters[:, STAMP_BYTES - 1 :].any(axis=1)
+        wrong = (letters > 127).any(axis=1) | letters[:, _BYTES - 1 :].any(axis=1)
         for row in np.flatnonzero(wrong).tolist():
             text = texts[row].decode("utf-8", "ignore")
             if text not in MISSING:
