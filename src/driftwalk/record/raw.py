@@ -44,7 +44,6 @@ class TableLayout:
 
 
 Array = Floats
-_EMPTY: Final[Array] = np.zeros(0)
 
 LENGTH_UNITS: dict[str, float] = {
     **{"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "km": 1e3, "dm": 0.1, "nm": 1e-9},
@@ -95,22 +94,15 @@ class RawBody:
         extra = {name: values[rows] for name, values in self.extra.items()}
         return RawBody(self.name, self.clock[rows], self.x[rows], self.y[rows], theta, extra=extra)
 
-    def split(self, parts: Sequence[tuple[str, Integers]]) -> list[RawBody]:
-        """Return bodies by their names and rows, and keep none: no two columns are held twice."""
-        bodies = [RawBody(name, _EMPTY, _EMPTY, _EMPTY) for name, _ in parts]
-        for column in ("clock", "x", "y", *(() if self.theta is None else ("theta",))):
-            values = self.let_go(column)
-            for body, (_, rows) in zip(bodies, parts, strict=True):
-                setattr(body, column, values[rows])
-        for body, (_, rows) in zip(bodies, parts, strict=True):
-            body.extra = {name: values[rows] for name, values in self.extra.items()}
-        return bodies
-
-    def let_go(self, column: str) -> Array:
-        """Return a column that the body keeps no more, to be freed as soon as it is used."""
-        values: Array = getattr(self, column)
-        setattr(self, column, _EMPTY)
-        return values
+    def split(self, names: Sequence[str], parts: Sequence[Bools | Integers]) -> list[RawBody]:
+        """Return bodies of these names and rows, and lose each column as soon as they have it."""
+        columns = []
+        for column in ("clock", "x", "y", "theta"):
+            values = vars(self).pop(column)
+            columns.append([None if values is None else values[rows] for rows in parts])
+        extra = [{key: one[rows] for key, one in self.extra.items()} for rows in parts]
+        bodies = zip(names, *columns, extra, strict=True)
+        return [RawBody(*of, extra=further) for *of, further in bodies]
 
     def blank(self, lost: Bools) -> None:
         """Make rows missing, in new arrays."""

@@ -261,7 +261,7 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
         raise FormatError(
             f"expected at least {needed} columns, got {len(layout.names)}: is it another format?",
         )
-    collected = _Collected(layout, path)
+    collected = _Collected(layout)
     for line, block in islice(blocks_of(path, layout.skip_lines), blocks):
         # pandas fails on a table of blank lines alone.
         if block.strip(b" \r\n"):
@@ -272,12 +272,10 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
 class _Collected:
     """Columns of a table as far as it is read, each of them held once."""
 
-    def __init__(self, layout: TableLayout, path: Path) -> None:
+    def __init__(self, layout: TableLayout) -> None:
         self._layout = layout
-        self._path = path
-        # With room for the values to come.
-        self._numbers = dict.fromkeys((*layout.numbers, *layout.stamps[:1]), np.empty(0))
-        self._codes = dict.fromkeys(layout.texts, np.empty(0, dtype=np.int32))
+        self._numbers = {at: np.empty(0) for at in (*layout.numbers, *layout.stamps[:1])}
+        self._codes = {at: np.empty(0, dtype=np.int32) for at in layout.texts}
         self._room = 0
         self._labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
         self._stamps = {column: StampReader() for column in layout.stamps}
@@ -290,7 +288,7 @@ class _Collected:
         frame = self._parsed(block, line)
         rows = slice(self._rows, self._rows + len(frame))
         if rows.stop > self._room:
-            self._make_room(len(frame), len(block))
+            self._resize(rows.stop + self._room // 4)  # chosen by hand
         clock = self._layout.clock
         for column in self._layout.numbers:
             values = frame[column].to_numpy()
@@ -309,23 +307,19 @@ class _Collected:
             self._numbers[self._layout.stamps[0]][rows] = self._clock(frame, block, line)
         self._rows = rows.stop
 
-    def _make_room(self, rows: int, size: int) -> None:
-        """Make room for as many rows as the file holds, by the rows in a block of some bytes."""
-        # Memory that is never written to is never taken. A packed file has more rows than that.
-        expected = rows + rows * self._path.stat().st_size // size
-        self._room = max(expected, self._rows + rows, 2 * self._room)
-        columns: dict[int, npt.NDArray[Any]]
-        for columns in (self._numbers, self._codes):
-            for column, values in columns.items():
-                columns[column] = np.empty(self._room, dtype=values.dtype)
-                columns[column][: self._rows] = values[: self._rows]
+    def _resize(self, rows: int) -> None:
+        """Make room for so many rows where the columns are: no list of parts is to be joined."""
+        self._room = rows
+        for column in self._numbers.values():
+            column.resize(rows, refcheck=False)
+        for codes in self._codes.values():
+            codes.resize(rows, refcheck=False)
 
     def table(self) -> Table:
         """Return what was read."""
         if not self._rows:
             raise FormatError("holds no rows of data")
-        for values in (*self._numbers.values(), *self._codes.values()):
-            values.resize(self._rows, refcheck=False)
+        self._resize(self._rows)
         return Table(
             rows=self._rows,
             numbers=self._numbers,

@@ -123,7 +123,7 @@ def split_bodies(rows: RawBody, codes: Codes, labels: Sequence[str]) -> list[Raw
     Parameters
     ----------
     rows : RawBody
-        The rows of all bodies; it is left without them where there are several.
+        The rows of all bodies, which it loses where there are several.
     codes : array of int32, shape (n,)
         Index of each row's body in `labels`.
     labels : sequence of str
@@ -137,8 +137,10 @@ def split_bodies(rows: RawBody, codes: Codes, labels: Sequence[str]) -> list[Raw
     refuse_many_bodies(labels)
     if len(labels) == 1:
         return [replace(rows, name=labels[0])]
-    places = zip(labels, rows_of_bodies(codes, number=len(labels)), strict=True)
-    return rows.split([(name, at) for name, at in places if at.size])
+    # A mask has one byte a row, and the number of a row has eight.
+    masks = [codes == at for at in range(len(labels))] if len(labels) <= 8 else None
+    places = masks or rows_of_bodies(codes, number=len(labels))
+    return [body for body in rows.split(labels, places) if body.clock.size]
 
 
 def rows_of_bodies(codes: Codes, *, number: int = 0) -> list[Integers]:

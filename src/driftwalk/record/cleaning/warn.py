@@ -62,7 +62,13 @@ def plausibility_warnings(bodies: list[RawBody], intervals: list[float]) -> list
     elif only or extent > PLAUSIBLE.largest_extent_m:
         span = f"{only}{extent:.3g} m"
         warnings.append(f"the positions span {span}: is the unit, or the scale, right?")
-    warnings += _clock_warnings(bodies, intervals)
+    clocks = [body.clock for body in bodies if body.clock.size]
+    lasts = max(float(clock[-1] - clock[0]) for clock in clocks)
+    usual = min(intervals, default=np.inf)
+    if lasts > PLAUSIBLE.longest_recording_s:
+        warnings.append(f"the recording lasts {lasts:.3g} s: is the unit of its clock right?")
+    elif usual < PLAUSIBLE.shortest_interval_s:
+        warnings.append(f"the usual interval is {usual:.3g} s: is the unit of the clock right?")
     speeds = [0.0]
     for body in bodies:
         t, x, y = (np.diff(values[:10_000]) for values in (body.clock, body.x, body.y))
@@ -81,18 +87,6 @@ def span_of(series: Sequence[Array]) -> float:
     high = max(float(np.max(one, where=at, initial=-np.inf)) for one, at in known)
     low = min(float(np.min(one, where=at, initial=np.inf)) for one, at in known)
     return high - low if high >= low else 0.0
-
-
-def _clock_warnings(bodies: list[RawBody], intervals: list[float]) -> list[str]:
-    if not intervals:
-        return []
-    last = max(float(body.clock[-1] - body.clock[0]) for body in bodies if body.clock.size > 1)
-    shortest = min(intervals)
-    if last > PLAUSIBLE.longest_recording_s:
-        return [f"the recording lasts {last:.3g} s: is the unit of its clock right?"]
-    if shortest < PLAUSIBLE.shortest_interval_s:
-        return [f"the usual interval is {shortest:.3g} s: is the unit of the clock right?"]
-    return []
 
 
 def angle_warnings(raw: RawRecording) -> list[str]:
