@@ -143,14 +143,13 @@ def convert_units(
         attrs["sample_rate_Hz"] = rate
     if in_pixels:
         attrs["metres_per_pixel"] = scale
-    clocks = _convert_clocks(raw, ticks, attrs)
+    _convert_clocks(raw, ticks, attrs)
     turn = ANGLE_UNITS[raw.angle_unit] * (-1.0 if flip_theta else 1.0)
     for body in raw.bodies:
-        body.clock = clocks[id(body.clock)]
-        body.x = np.multiply(body.x, scale, out=_writable(body.x))
-        body.y = np.multiply(body.y, -scale if flip else scale, out=_writable(body.y))
+        body.x *= scale
+        body.y *= -scale if flip else scale
         if body.theta is not None and turn != 1.0:
-            body.theta = np.multiply(body.theta, turn, out=_writable(body.theta))
+            body.theta *= turn
     return attrs
 
 
@@ -230,8 +229,8 @@ def _describe_negated(raw: RawRecording, flip: bool, flip_theta: bool) -> str:
     return f"{kept} kept, {negated} negated (measured in the image)"
 
 
-def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -> dict[int, Array]:
-    """Return each distinct clock array in seconds; bodies that shared one still do."""
+def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -> None:
+    """Convert each distinct clock array to seconds, in place, and say when it begins."""
     arrays = {id(body.clock): body.clock for body in raw.bodies}
     # Without copies: a clock may have millions of times. An infinite one is no time.
     known = [(clock, np.isfinite(clock)) for clock in arrays.values()]
@@ -248,14 +247,7 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
         attrs["time_origin"] = moment_text(raw.clock_origin + int(origin), raw.calendar)
     elif raw.calendar == DAY:
         attrs["time_origin"] = "00:00:00"
-    converted = {key: _writable(clock) for key, clock in arrays.items()}
-    for clock in converted.values():
+    for clock in arrays.values():
         with np.errstate(invalid="ignore"):  # damage may leave a NaN that signals
             np.subtract(clock, origin, out=clock)
             np.divide(clock, ticks, out=clock)
-    return converted
-
-
-def _writable(values: Array) -> Array:
-    """Return the array itself, or a copy where a reader handed out one that is locked."""
-    return values if values.flags.writeable else values.copy()

@@ -24,7 +24,6 @@ from driftwalk.record.cleaning.warn import (
     plausibility_warnings,
     refuse_many_bodies,
     refuse_sparse,
-    usual_intervals,
 )
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.pose import join_markers, two_names
@@ -301,7 +300,9 @@ def _assemble(
         notes += placed.notes
     jumps = _count_impossible(bodies, counts, arena)
     totals = {key: sum(getattr(one, key) for one in counts.values()) for key in vars(Counts())}
-    intervals = usual_intervals(bodies)
+    # The differences are the median's own to sort: a long recording is not to be held twice.
+    steps = (np.diff(body.clock) for body in bodies if body.clock.size > 1)
+    intervals = [float(np.median(step, overwrite_input=True)) for step in steps]
     if twice := totals["times_in_two_places"]:
         notes.append(f"times with rows in different places, of which the last is kept: {twice}")
     notes += [*plausibility_warnings(bodies, intervals), *jumps]
@@ -374,7 +375,6 @@ def _on_clock(time: Array, bodies: list[RawBody], values: Sequence[Array | None]
     columns = np.full((time.size, len(bodies), *shape), np.nan)
     for index, (body, one) in enumerate(zip(bodies, values, strict=True)):
         if one is not None:
-            everywhere = body.clock.size == time.size
-            rows = slice(None) if everywhere else np.searchsorted(time, body.clock)
-            columns[rows, index] = one
+            whole = body.clock.size == time.size  # so it is the common clock
+            columns[slice(None) if whole else np.searchsorted(time, body.clock), index] = one
     return columns

@@ -6,7 +6,7 @@ a loader only says what the file holds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -93,16 +93,6 @@ class RawBody:
         theta = None if self.theta is None else self.theta[rows]
         extra = {name: values[rows] for name, values in self.extra.items()}
         return RawBody(self.name, self.clock[rows], self.x[rows], self.y[rows], theta, extra=extra)
-
-    def split(self, names: Sequence[str], parts: Sequence[Bools | Integers]) -> list[RawBody]:
-        """Return bodies of these names and rows, and lose each column as soon as they have it."""
-        columns = []
-        for column in ("clock", "x", "y", "theta"):
-            values = vars(self).pop(column)
-            columns.append([None if values is None else values[rows] for rows in parts])
-        extra = [{key: one[rows] for key, one in self.extra.items()} for rows in parts]
-        bodies = zip(names, *columns, extra, strict=True)
-        return [RawBody(*of, extra=further) for *of, further in bodies]
 
     def blank(self, lost: Bools) -> None:
         """Make rows missing, in new arrays."""

@@ -140,7 +140,13 @@ def split_bodies(rows: RawBody, codes: Codes, labels: Sequence[str]) -> list[Raw
     # A mask has one byte a row, and the number of a row has eight.
     masks = [codes == at for at in range(len(labels))] if len(labels) <= 8 else None
     places = masks or rows_of_bodies(codes, number=len(labels))
-    return [body for body in rows.split(labels, places) if body.clock.size]
+    columns = []
+    for column in ("clock", "x", "y", "theta"):  # each is let go as soon as the bodies have it
+        values = vars(rows).pop(column)
+        columns.append([None if values is None else values[at] for at in places])
+    extra = [{name: values[at] for name, values in rows.extra.items()} for at in places]
+    parts = zip(labels, *columns, extra, strict=True)
+    return [RawBody(*of, extra=further) for *of, further in parts if of[1].size]
 
 
 def rows_of_bodies(codes: Codes, *, number: int = 0) -> list[Integers]:

@@ -35,13 +35,6 @@ class PlausibilityPolicy(NamedTuple):
 PLAUSIBLE: Final = PlausibilityPolicy()
 
 
-def usual_intervals(bodies: list[RawBody]) -> list[float]:
-    """Return the median interval between the samples of each body that has several."""
-    # The differences are the median's own to sort: a long recording is not to be held twice.
-    steps = (np.diff(body.clock) for body in bodies if body.clock.size > 1)
-    return [float(np.median(step, overwrite_input=True)) for step in steps]
-
-
 def plausibility_warnings(bodies: list[RawBody], intervals: list[float]) -> list[str]:
     """Return what looks wrong about extent and speed: most often a unit or a scale.
 
@@ -50,7 +43,7 @@ def plausibility_warnings(bodies: list[RawBody], intervals: list[float]) -> list
     bodies : list of RawBody
         In SI units.
     intervals : list of float
-        As `usual_intervals` returns them [s].
+        The median interval [s] of each body that has several samples.
     """
     if not any(np.isfinite(body.x).any() for body in bodies):
         return ["no row holds a position"]
@@ -62,8 +55,7 @@ def plausibility_warnings(bodies: list[RawBody], intervals: list[float]) -> list
     elif only or extent > PLAUSIBLE.largest_extent_m:
         span = f"{only}{extent:.3g} m"
         warnings.append(f"the positions span {span}: is the unit, or the scale, right?")
-    clocks = [body.clock for body in bodies if body.clock.size]
-    lasts = max(float(clock[-1] - clock[0]) for clock in clocks)
+    lasts = max(float(body.clock[-1] - body.clock[0]) for body in bodies if body.clock.size)
     usual = min(intervals, default=np.inf)
     if lasts > PLAUSIBLE.longest_recording_s:
         warnings.append(f"the recording lasts {lasts:.3g} s: is the unit of its clock right?")
@@ -108,8 +100,7 @@ def angle_warnings(raw: RawRecording) -> list[str]:
             steps = np.diff(theta)
         np.abs(steps, out=steps)
         leaps = bool((steps > PLAUSIBLE.leap_rad).any())
-        usual = np.median(steps, overwrite_input=True) if steps.size > 1 else 0.0
-        fast = usual > PLAUSIBLE.usual_step_rad
+        fast = steps.size > 1 and np.median(steps, overwrite_input=True) > PLAUSIBLE.usual_step_rad
         if theta.size and (abs(theta[0]) > 6.2832 or leaps or fast):
             low, high = float(theta.min()), float(theta.max())
             return [

@@ -41,8 +41,8 @@ class DriftwalkLoader:
         except ValueError as error:
             raise FormatError(str(error)) from error
         extra = _extra(dataset)
-        time = np.asarray(dataset["time"].values, dtype=np.float64)
-        fields = [np.asarray(dataset[name].values, np.float64) for name in ("x", "y", "theta")]
+        time = np.array(dataset["time"].values, dtype=np.float64)
+        fields = [np.array(dataset[name].values, np.float64) for name in ("x", "y", "theta")]
         bodies = []
         for index, name in enumerate(body_names(dataset)):
             x, y, theta = (np.ascontiguousarray(field[:, index]) for field in fields)
