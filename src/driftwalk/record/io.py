@@ -313,13 +313,10 @@ def _assemble(
     said = {"rows_in_file": raw.rows, **totals, "per_body": per_body, "warnings": notes}
     attrs["counts"] = json.dumps(said)
     names = [body.name for body in bodies]
-    further = {
-        name: _on_clock(time, bodies, [body.extra[name] for body in bodies]) for name in raw.extra
-    }
-    bodies.clear()  # what they hold is not to be held twice
     recording = build_trajectory(time, x, y, theta, body=names, attrs=attrs)
     for name, meaning in raw.extra.items():
-        recording[name] = (("time", "body", *meaning.dims), further[name], meaning.attrs)
+        values = _on_clock(time, bodies, [body.extra[name] for body in bodies])
+        recording[name] = (("time", "body", *meaning.dims), values, meaning.attrs)
         recording = recording.assign_coords(meaning.coords)
     return recording
 
@@ -356,7 +353,7 @@ def _track(body: RawBody) -> Track:
 
 
 def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None]:
-    """Return the union of the clocks and the bodies' columns on it."""
+    """Return the union of the clocks and the columns on it, which several bodies then lose."""
     has_theta = any(body.theta is not None for body in bodies)
     if len(bodies) == 1:
         return bodies[0].clock, bodies[0].x, bodies[0].y, bodies[0].theta
@@ -364,7 +361,7 @@ def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None
     if not all(np.array_equal(time, clock) for clock in others):
         time = np.unique(np.concatenate([time, *others]))
     refuse_sparse(time, bodies)
-    x, y = (_on_clock(time, bodies, [getattr(body, axis) for body in bodies]) for axis in "xy")
+    x, y = (_on_clock(time, bodies, [vars(body).pop(axis) for body in bodies]) for axis in "xy")
     theta = _on_clock(time, bodies, [body.theta for body in bodies]) if has_theta else None
     return time, x, y, theta
 

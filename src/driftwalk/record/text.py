@@ -277,7 +277,6 @@ class _Collected:
         self._columns: dict[int, npt.NDArray[Any]] = {at: np.empty(0) for at in layout.numbers}
         self._columns |= {at: np.empty(0) for at in layout.stamps[:1]}
         self._columns |= {at: np.empty(0, dtype=np.int32) for at in layout.texts}
-        self._room = 0
         self._labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
         self._stamps = {column: StampReader() for column in layout.stamps}
         self._decimal = "."
@@ -288,8 +287,9 @@ class _Collected:
         """Read a block of whole lines; its first has this number."""
         frame = self._parsed(block, line)
         rows = slice(self._rows, self._rows + len(frame))
-        if rows.stop > self._room:
-            self._resize(rows.stop + self._room // 4)  # chosen by hand
+        room = next(iter(self._columns.values())).size
+        if rows.stop > room:
+            self._resize(rows.stop + room // 4)  # a quarter more, chosen by hand
         clock = self._layout.clock
         for column in self._layout.numbers:
             values = frame[column].to_numpy()
@@ -310,7 +310,6 @@ class _Collected:
 
     def _resize(self, rows: int) -> None:
         """Make room for so many rows where the columns are: no list of parts is to be joined."""
-        self._room = rows
         for column in self._columns.values():
             column.resize(rows, refcheck=False)
 
@@ -407,8 +406,7 @@ def blocks_of(path: Path, skip_lines: int = 0) -> Iterator[tuple[int, bytes]]:
             if newline:
                 yield line, whole + newline
                 # Several times as fast as the method `count` of bytes.
-                ends = np.frombuffer(whole, dtype=np.uint8) == ord("\n")
-                line += 1 + int(np.count_nonzero(ends))
+                line += 1 + int(np.count_nonzero(np.frombuffer(whole, np.uint8) == ord("\n")))
         if rest.strip():
             yield line, rest + b"\n"
 

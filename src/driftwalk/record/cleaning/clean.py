@@ -123,7 +123,7 @@ def split_bodies(rows: RawBody, codes: Codes, labels: Sequence[str]) -> list[Raw
     Parameters
     ----------
     rows : RawBody
-        The rows of all bodies, which it loses where there are several.
+        The rows of all bodies, without further values; it loses them where there are several.
     codes : array of int32, shape (n,)
         Index of each row's body in `labels`.
     labels : sequence of str
@@ -144,9 +144,8 @@ def split_bodies(rows: RawBody, codes: Codes, labels: Sequence[str]) -> list[Raw
     for column in ("clock", "x", "y", "theta"):  # each is let go as soon as the bodies have it
         values = vars(rows).pop(column)
         columns.append([None if values is None else values[at] for at in places])
-    extra = [{name: values[at] for name, values in rows.extra.items()} for at in places]
-    parts = zip(labels, *columns, extra, strict=True)
-    return [RawBody(*of, extra=further) for *of, further in parts if of[1].size]
+    parts = zip(labels, *columns, strict=True)
+    return [RawBody(name, clock, *of) for name, clock, *of in parts if clock.size]
 
 
 def rows_of_bodies(codes: Codes, *, number: int = 0) -> list[Integers]:
@@ -260,7 +259,7 @@ def clean_body(
     Parameters
     ----------
     body : RawBody
-        In SI units. Arrays without a fault are used as they are, not copied.
+        In SI units. Its arrays are written to, or replaced where rows are left out.
     sort : {"error", "sort"}
         Behaviour if times go backwards.
     start, stop : float, optional
@@ -308,16 +307,14 @@ def clean_body(
     counts.missing = int(lost.sum())
     if counts.missing:  # half a position is none
         body.x[lost] = body.y[lost] = np.nan
-    if body.theta is not None and not np.isfinite(body.theta).all():
-        body.theta = np.where(np.isfinite(body.theta), body.theta, np.nan)
+    if body.theta is not None:
+        body.theta[~np.isfinite(body.theta)] = np.nan
     if max_speed is not None:
         if not max_speed > 0:
             raise InputError(f"`max_speed` must be above zero, got {max_speed} m/s")
         jumps = find_jumps(body, max_speed)
         counts.jumps_removed = int(jumps.size)
-        if jumps.size:
-            body = replace(body, x=body.x.copy(), y=body.y.copy())
-            body.x[jumps] = body.y[jumps] = np.nan
+        body.x[jumps] = body.y[jumps] = np.nan
     counts.samples = int(np.isfinite(body.x).sum())
     return body, counts
 

@@ -81,7 +81,7 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
         counts = "counts as a frame" if alone else "of a body counts as a frame, from its first on"
         notes.insert(0, f"the table has no column of times or frames: every row {counts}")
     if table.calendar == DAY:
-        clock = count_days(clock, codes)
+        count_days(clock, codes)
     bodies, against = _bodies(table, reading, clock, options)
     doubts = _doubted_confidences(table, reading, options)
     if codes is not None:

@@ -298,9 +298,7 @@ def clock_of_stamps(columns: list[Ticks], origin: int | None) -> tuple[Floats, i
     total = np.sum(columns, axis=0, where=known[None, :])
     if origin is None and known.any():
         origin = int(total[np.argmax(known)])
-    clock = np.full(known.size, np.nan)
-    clock[known] = total[known] - (origin or 0)
-    return clock, origin
+    return np.where(known, total - (origin or 0), np.nan), origin
 
 
 def moment_text(nanoseconds: int, calendar: str) -> str:
@@ -317,8 +315,8 @@ def moment_text(nanoseconds: int, calendar: str) -> str:
     return f"{text}{decimals}{'Z' if calendar == UTC else ''}"
 
 
-def count_days(clock: Array, codes: Codes | None) -> Array:
-    """Return times of day with a day more after each midnight.
+def count_days(clock: Array, codes: Codes | None) -> None:
+    """Add a day to times of day after each midnight, in place.
 
     Rows of several bodies that take turns are in the order of their times: midnight is the same row
     for all. Where bodies stand one below the other, each has its own midnights.
@@ -330,15 +328,14 @@ def count_days(clock: Array, codes: Codes | None) -> Array:
     codes : array of int32, shape (n,), optional
         Index of each row's body, from 0 on; None: all share the clock.
     """
-    if codes is None:
-        return counted_on(clock, DAY_NS)
-    changes = np.flatnonzero(codes[1:] != codes[:-1]) + 1
-    parts = [clock] if changes.size > codes.max() else np.split(clock, changes)
-    return np.concatenate([counted_on(part, DAY_NS) for part in parts])
+    changes = np.zeros(0) if codes is None else np.flatnonzero(codes[1:] != codes[:-1]) + 1
+    turns = codes is not None and changes.size > codes.max()
+    for part in [clock] if turns else np.split(clock, changes.astype(np.int64)):
+        count_on(part, DAY_NS)
 
 
-def counted_on(clock: Array, period: float) -> Array:
-    """Return a clock that starts over after each period with that period more each time.
+def count_on(clock: Array, period: float) -> None:
+    """Let a clock that starts over after each period count on, in place.
 
     A step back by more than half a period is a start.
 
@@ -351,13 +348,10 @@ def counted_on(clock: Array, period: float) -> Array:
 
     Examples
     --------
-    >>> counted_on(np.array([23.0, 1.0]), 24.0).tolist()
+    >>> clock = np.array([23.0, 1.0])
+    >>> count_on(clock, 24.0)
+    >>> clock.tolist()
     [23.0, 25.0]
     """
     known = np.flatnonzero(np.isfinite(clock))
-    starts = np.diff(clock[known]) < -0.5 * period
-    if not starts.any():
-        return clock
-    counted = clock.copy()
-    counted[known[1:]] += period * np.cumsum(starts)
-    return counted
+    clock[known[1:]] += period * np.cumsum(np.diff(clock[known]) < -0.5 * period)
