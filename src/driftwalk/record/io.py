@@ -312,8 +312,7 @@ def _assemble(
     per_body = {name: vars(found) for name, found in counts.items()}
     said = {"rows_in_file": raw.rows, **totals, "per_body": per_body, "warnings": notes}
     attrs["counts"] = json.dumps(said)
-    names = [body.name for body in bodies]
-    recording = build_trajectory(time, x, y, theta, body=names, attrs=attrs)
+    recording = build_trajectory(time, x, y, theta, body=[one.name for one in bodies], attrs=attrs)
     for name, meaning in raw.extra.items():
         values = _on_clock(time, bodies, [body.extra[name] for body in bodies])
         recording[name] = (("time", "body", *meaning.dims), values, meaning.attrs)

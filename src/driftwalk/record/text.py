@@ -150,10 +150,9 @@ def encoding_notes(path: Path) -> list[str]:
     """
     if not path.is_file():
         return []
+    note = "the text is not UTF-8 and was read as Windows-1252: check letters such as µ and °"
     with _opened(path) as file:
-        if _encoding(file) != WINDOWS:
-            return []
-    return ["the text is not UTF-8 and was read as Windows-1252: check letters such as µ and °"]
+        return [note] if _encoding(file) == WINDOWS else []
 
 
 def _opened(path: Path) -> io.BufferedReader:
@@ -290,10 +289,9 @@ class _Collected:
         room = next(iter(self._columns.values())).size
         if rows.stop > room:
             self._resize(rows.stop + room // 4)  # a quarter more, chosen by hand
-        clock = self._layout.clock
         for column in self._layout.numbers:
             values = frame[column].to_numpy()
-            if column == clock:
+            if column == self._layout.clock:
                 if self._origin is None:
                     self._origin = far_origin(values)
                 if self._origin:

@@ -190,8 +190,8 @@ def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
         Names the body and the number.
     """
     for body in bodies:
-        places = (("x", body.x), ("y", body.y))
-        reach = max(_farthest(body, *one, EXTENT.farthest_m / scale) for one in places)
+        most = EXTENT.farthest_m / scale
+        reach = max(_farthest(body, "x", body.x, most), _farthest(body, "y", body.y, most))
         if 0.0 < reach < EXTENT.nearest_m / scale:
             raise InputError(
                 f"body '{body.name}' has no position that is further than {reach:.3g} from "

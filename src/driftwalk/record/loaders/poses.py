@@ -237,8 +237,7 @@ class SleapCsvLoader:
         numbers = table.numbers
         raw = recording_of_poses(places, numbers.__getitem__, numbers[frame], options, OF_SLEAP)
         if track is not None:
-            (rows,) = raw.bodies
-            raw.bodies = split_bodies(rows, table.codes[track], table.labels[track])
+            raw.bodies = split_bodies(raw.bodies[0], table.codes[track], table.labels[track])
             for one in raw.bodies:
                 if not one.name and np.unique(one.clock).size < one.clock.size:
                     what = "several instances of one frame have no track"

@@ -136,8 +136,9 @@ class StampReader:
             At a text that is no stamp, or of another kind than the first.
         """
         if texts.dtype.kind != "S":
-            starts = [text[:_BYTES].encode("utf-8", "replace") for text in texts.tolist()]
-            texts = np.array(starts, dtype="S")
+            texts = np.array(
+                [one[:_BYTES].encode("utf-8", "replace") for one in texts.tolist()], "S"
+            )
         ascii_texts = _ascii(np.ascontiguousarray(texts))
         found = np.full(ascii_texts.size, NO_TIME, dtype=np.int64)
         for rows in _of_one_shape(ascii_texts):
@@ -328,9 +329,9 @@ def count_days(clock: Array, codes: Codes | None) -> None:
     codes : array of int32, shape (n,), optional
         Index of each row's body, from 0 on; None: all share the clock.
     """
-    changes = np.zeros(0) if codes is None else np.flatnonzero(codes[1:] != codes[:-1]) + 1
-    turns = codes is not None and changes.size > codes.max()
-    for part in [clock] if turns else np.split(clock, changes.astype(np.int64)):
+    changes = np.flatnonzero(np.diff([] if codes is None else codes)) + 1
+    in_turns = codes is not None and changes.size > codes.max()
+    for part in [clock] if in_turns else np.split(clock, changes):
         count_on(part, DAY_NS)
 
 
