@@ -357,7 +357,7 @@ def _clock(dataset: xr.Dataset) -> tuple[Array, str]:
     if "time" not in dataset.coords:
         return np.arange(dataset.sizes["time"], dtype=np.float64), "frame"
     unit = "s" if str(dataset.attrs.get("time_unit", "")).startswith("s") else "frame"
-    return np.asarray(_array(dataset, "time").values, dtype=np.float64), unit
+    return np.array(_array(dataset, "time").values, dtype=np.float64), unit
 
 
 LOADERS = (DeepLabCutLoader(), SleapLoader(), SleapCsvLoader(), MovementLoader())

@@ -117,9 +117,7 @@ class StampReader:
     @property
     def calendar(self) -> str:
         """Origin of the nanoseconds: 1970 in ``UTC`` or in a ``LOCAL`` zone, or a ``DAY``."""
-        if self.kind == OF_DAY:
-            return DAY
-        return UTC if self.zoned else LOCAL
+        return DAY if self.kind == OF_DAY else UTC if self.zoned else LOCAL
 
     def read(self, texts: npt.NDArray[Any]) -> Ticks:
         """Return nanoseconds since 1970, or since midnight; `NO_TIME` where there is no stamp.
@@ -136,9 +134,8 @@ class StampReader:
             At a text that is no stamp, or of another kind than the first.
         """
         if texts.dtype.kind != "S":
-            texts = np.array(
-                [one[:_BYTES].encode("utf-8", "replace") for one in texts.tolist()], "S"
-            )
+            starts = [text[:_BYTES].encode("utf-8", "replace") for text in texts.tolist()]
+            texts = np.array(starts, dtype="S")
         ascii_texts = _ascii(np.ascontiguousarray(texts))
         found = np.full(ascii_texts.size, NO_TIME, dtype=np.int64)
         for rows in _of_one_shape(ascii_texts):
