@@ -42,7 +42,7 @@ def detect_quantum(values: Array) -> float:
     0.25
     """
     present = np.isfinite(values)
-    count = int(present.sum())
+    count = int(np.count_nonzero(present))
     every = count // 50_000 + 1 if count > 50_000 else 1  # of many every second, third, ... one
     known = values[::every] if count == values.size else values[np.flatnonzero(present)[::every]]
     if known.size < 2:

@@ -285,7 +285,7 @@ def clean_body(
         raise InputError(f"sort is 'error' or 'sort', got '{sort}'")
     counts = Counts(rows=body.clock.size)
     known = np.isfinite(body.clock)
-    counts.without_time = int((~known).sum())
+    counts.without_time = int(np.count_nonzero(~known))
     if counts.without_time:
         body = body.take(known)
     body = _in_order(body, counts, sort=sort, columns=columns)
@@ -304,7 +304,7 @@ def clean_body(
         body = body.take(np.append(~repeated, True))
     _refuse_closest(body)
     lost = ~(np.isfinite(body.x) & np.isfinite(body.y))
-    counts.missing = int(lost.sum())
+    counts.missing = int(np.count_nonzero(lost))
     if counts.missing:  # half a position is none
         body.x[lost] = body.y[lost] = np.nan
     if body.theta is not None:
@@ -315,7 +315,7 @@ def clean_body(
         jumps = find_jumps(body, max_speed)
         counts.jumps_removed = int(jumps.size)
         body.x[jumps] = body.y[jumps] = np.nan
-    counts.samples = int(np.isfinite(body.x).sum())
+    counts.samples = int(np.count_nonzero(np.isfinite(body.x)))
     return body, counts
 
 
