@@ -18,7 +18,6 @@ from driftwalk.record.raw import (
     CLOCK_UNITS,
     LENGTH_UNITS,
     Array,
-    RawBody,
     RawRecording,
     ReadOptions,
 )
@@ -43,7 +42,7 @@ def detect_quantum(values: Array) -> float:
     0.25
     """
     present = np.isfinite(values)
-    count = int(present.sum())
+    count = int(np.count_nonzero(present))
     every = count // 50_000 + 1 if count > 50_000 else 1  # of many every second, third, ... one
     known = values[::every] if count == values.size else values[np.flatnonzero(present)[::every]]
     if known.size < 2:
@@ -97,8 +96,8 @@ def convert_units(
     *,
     y_axis: str | None = None,
     tank: str | None = None,
-) -> tuple[list[RawBody], dict[str, object]]:
-    """Return the bodies in s, m and rad with y up, and the attributes that say what was done.
+) -> dict[str, object]:
+    """Convert the bodies to s, m and rad with y up; return the attributes that say what was done.
 
     The arrays of `raw` are converted in place, so that a large recording is held once.
 
@@ -144,17 +143,14 @@ def convert_units(
         attrs["sample_rate_Hz"] = rate
     if in_pixels:
         attrs["metres_per_pixel"] = scale
-    clocks = _convert_clocks(raw, ticks, attrs)
+    _convert_clocks(raw, ticks, attrs)
     turn = ANGLE_UNITS[raw.angle_unit] * (-1.0 if flip_theta else 1.0)
-    bodies = []
     for body in raw.bodies:
-        x = np.multiply(body.x, scale, out=_writable(body.x))
-        y = np.multiply(body.y, -scale if flip else scale, out=_writable(body.y))
-        theta = body.theta
-        if theta is not None and turn != 1.0:
-            theta = np.multiply(theta, turn, out=_writable(theta))
-        bodies.append(RawBody(body.name, clocks[id(body.clock)], x, y, theta, extra=body.extra))
-    return bodies, attrs
+        body.x *= scale
+        body.y *= -scale if flip else scale
+        if body.theta is not None and turn != 1.0:
+            body.theta *= turn
+    return attrs
 
 
 def scale_wanted(length_unit: str, bare_is_si: bool, options: ReadOptions) -> str:
@@ -233,8 +229,8 @@ def _describe_negated(raw: RawRecording, flip: bool, flip_theta: bool) -> str:
     return f"{kept} kept, {negated} negated (measured in the image)"
 
 
-def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -> dict[int, Array]:
-    """Return each distinct clock array in seconds; bodies that shared one still do."""
+def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -> None:
+    """Convert each distinct clock array to seconds, in place, and say when it begins."""
     arrays = {id(body.clock): body.clock for body in raw.bodies}
     # Without copies: a clock may have millions of times. An infinite one is no time.
     known = [(clock, np.isfinite(clock)) for clock in arrays.values()]
@@ -251,14 +247,7 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
         attrs["time_origin"] = moment_text(raw.clock_origin + int(origin), raw.calendar)
     elif raw.calendar == DAY:
         attrs["time_origin"] = "00:00:00"
-    converted = {key: _writable(clock) for key, clock in arrays.items()}
-    for clock in converted.values():
+    for clock in arrays.values():
         with np.errstate(invalid="ignore"):  # damage may leave a NaN that signals
             np.subtract(clock, origin, out=clock)
             np.divide(clock, ticks, out=clock)
-    return converted
-
-
-def _writable(values: Array) -> Array:
-    """Return the array itself, or a copy where a reader handed out one that is locked."""
-    return values if values.flags.writeable else values.copy()

@@ -201,12 +201,12 @@ def load(
         blank_missing(raw, options.missing)
         raw.notes += [*origin.notes(), *unwrap_counters(raw), *check_clock(raw)]
         raw.notes += [*angle_warnings(raw), *mark_warnings(raw, options.missing)]
-        bodies, attrs = convert_units(raw, options, y_axis=y_axis, tank=tank)
+        attrs = convert_units(raw, options, y_axis=y_axis, tank=tank)
         cleaned: list[RawBody] = []
         counts: dict[str, Counts] = {}
-        while bodies:  # the uncleaned one is let go as soon as its successor is there
+        while raw.bodies:  # the uncleaned one is let go as soon as its successor is there
             one, found = clean_body(
-                bodies.pop(0),
+                raw.bodies.pop(0),
                 sort=sort,
                 start=start,
                 stop=stop,
@@ -300,20 +300,19 @@ def _assemble(
         notes += placed.notes
     jumps = _count_impossible(bodies, counts, arena)
     totals = {key: sum(getattr(one, key) for one in counts.values()) for key in vars(Counts())}
-    time, x, y, theta = _one_clock(bodies)
-    if "sample_rate_Hz" not in attrs and time.size > 1:
-        # The differences are the median's own to sort: a long recording is not to be held twice.
-        steps = (np.diff(body.clock) for body in bodies if body.clock.size > 1)
-        intervals = [float(np.median(step, overwrite_input=True)) for step in steps]
-        attrs["sample_rate_Hz"] = float(1.0 / np.median(intervals)) if intervals else 0.0
+    # The differences are the median's own to sort: a long recording is not to be held twice.
+    steps = (np.diff(body.clock) for body in bodies if body.clock.size > 1)
+    intervals = [float(np.median(step, overwrite_input=True)) for step in steps]
     if twice := totals["times_in_two_places"]:
         notes.append(f"times with rows in different places, of which the last is kept: {twice}")
-    notes += [*plausibility_warnings(bodies), *jumps]
+    notes += [*plausibility_warnings(bodies, intervals), *jumps]
+    time, x, y, theta = _one_clock(bodies)
+    if "sample_rate_Hz" not in attrs and time.size > 1:
+        attrs["sample_rate_Hz"] = float(1.0 / np.median(intervals)) if intervals else 0.0
     per_body = {name: vars(found) for name, found in counts.items()}
     said = {"rows_in_file": raw.rows, **totals, "per_body": per_body, "warnings": notes}
     attrs["counts"] = json.dumps(said)
-    names = [body.name for body in bodies]
-    recording = build_trajectory(time, x, y, theta, body=names, attrs=attrs)
+    recording = build_trajectory(time, x, y, theta, body=[one.name for one in bodies], attrs=attrs)
     for name, meaning in raw.extra.items():
         values = _on_clock(time, bodies, [body.extra[name] for body in bodies])
         recording[name] = (("time", "body", *meaning.dims), values, meaning.attrs)
@@ -353,14 +352,15 @@ def _track(body: RawBody) -> Track:
 
 
 def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None]:
-    """Return the union of the clocks and the bodies' columns on it."""
+    """Return the union of the clocks and the columns on it, which several bodies then lose."""
     has_theta = any(body.theta is not None for body in bodies)
     if len(bodies) == 1:
         return bodies[0].clock, bodies[0].x, bodies[0].y, bodies[0].theta
-    clocks = {id(body.clock): body.clock for body in bodies}
-    time = np.unique(np.concatenate(list(clocks.values())))
+    time, *others = {id(body.clock): body.clock for body in bodies}.values()
+    if not all(np.array_equal(time, clock) for clock in others):
+        time = np.unique(np.concatenate([time, *others]))
     refuse_sparse(time, bodies)
-    x, y = (_on_clock(time, bodies, [getattr(body, axis) for body in bodies]) for axis in "xy")
+    x, y = (_on_clock(time, bodies, [vars(body).pop(axis) for body in bodies]) for axis in "xy")
     theta = _on_clock(time, bodies, [body.theta for body in bodies]) if has_theta else None
     return time, x, y, theta
 
@@ -371,5 +371,6 @@ def _on_clock(time: Array, bodies: list[RawBody], values: Sequence[Array | None]
     columns = np.full((time.size, len(bodies), *shape), np.nan)
     for index, (body, one) in enumerate(zip(bodies, values, strict=True)):
         if one is not None:
-            columns[np.searchsorted(time, body.clock), index] = one
+            whole = body.clock.size == time.size  # so it is the common clock
+            columns[slice(None) if whole else np.searchsorted(time, body.clock), index] = one
     return columns

@@ -95,10 +95,10 @@ class RawBody:
         return RawBody(self.name, self.clock[rows], self.x[rows], self.y[rows], theta, extra=extra)
 
     def blank(self, lost: Bools) -> None:
-        """Make rows missing, in new arrays."""
-        self.x, self.y = np.where(lost, np.nan, self.x), np.where(lost, np.nan, self.y)
+        """Make rows missing, in place."""
+        self.x[lost] = self.y[lost] = np.nan
         if self.theta is not None:
-            self.theta = np.where(lost, np.nan, self.theta)
+            self.theta[lost] = np.nan
 
 
 @dataclass(frozen=True)

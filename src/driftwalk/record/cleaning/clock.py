@@ -8,7 +8,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.raw import CLOCK_UNITS, Array, RawRecording
-from driftwalk.record.tables.stamps import counted_on
+from driftwalk.record.tables.stamps import count_on
 
 
 class ClockPolicy(NamedTuple):
@@ -168,18 +168,15 @@ def unwrap_counters(raw: RawRecording) -> list[str]:
         moduli += [(86_400.0 * ticks, "a day")] if raw.calendar == "" else []
     moduli.sort()
     notes: dict[str, None] = {}
-    unwrapped: dict[int, Array] = {}
-    for key, clock in {id(body.clock): body.clock for body in raw.bodies}.items():
+    for clock in {id(body.clock): body.clock for body in raw.bodies}.values():
         finite = np.isfinite(clock)
         known = clock if finite.all() else clock[finite]
         if not (known[1:] < known[:-1]).any():
             continue
         if found := next((one for one in moduli if _rolls_over(known, one[0])), None):
             modulus, what = found
-            unwrapped[key] = counted_on(clock, modulus)
+            count_on(clock, modulus)
             notes[f"the clock rolls over after {modulus:.10g} ({what}): it is unwrapped"] = None
-    for body in raw.bodies:
-        body.clock = unwrapped.get(id(body.clock), body.clock)
     return list(notes)
 
 

@@ -55,8 +55,7 @@ def blank_missing(raw: RawRecording, marks: tuple[str, ...]) -> None:
         count = 0
         for body in raw.bodies:
             lost = _lost(body, mark)
-            if lost.any():
-                body.blank(lost)
+            body.blank(lost)
             count += int(lost.sum())
         raw.notes.append(f"samples that {argument_text('missing', mark)} makes missing: {count}")
 
@@ -116,13 +115,12 @@ def _marks_of(body: RawBody) -> list[tuple[str, str]]:
     del moving
     square = squared_steps(x, y)
     marks = []
-    with np.errstate(over="ignore"):
-        near, far = (square > (least * usual) ** 2 for least in (MARK.far_whole, MARK.far))
+    near = square > (MARK.far_whole * usual) ** 2
     # A place that is left and reached by long steps alone; noise has no such place.
-    if 0 < near.sum() <= x.size // 2:
-        marks += _far_places(x, y, near, far)
+    if 0 < np.count_nonzero(near) <= x.size // 2:
+        marks += _far_places(x, y, near, square > (MARK.far * usual) ** 2)
     still = square == 0.0
-    if 0.0 < still.mean() <= 1.0 - MARK.moving:
+    if 0 < np.count_nonzero(still) <= (1.0 - MARK.moving) * still.size:
         runs, rows = _held_runs(square, still, usual)
         if runs > 1 or rows > MARK.held:
             times = "once" if runs == 1 else f"{runs} times"

@@ -35,13 +35,15 @@ class PlausibilityPolicy(NamedTuple):
 PLAUSIBLE: Final = PlausibilityPolicy()
 
 
-def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
+def plausibility_warnings(bodies: list[RawBody], intervals: list[float]) -> list[str]:
     """Return what looks wrong about extent and speed: most often a unit or a scale.
 
     Parameters
     ----------
     bodies : list of RawBody
         In SI units.
+    intervals : list of float
+        The median interval [s] of each body that has several samples.
     """
     if not any(np.isfinite(body.x).any() for body in bodies):
         return ["no row holds a position"]
@@ -53,7 +55,12 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
     elif only or extent > PLAUSIBLE.largest_extent_m:
         span = f"{only}{extent:.3g} m"
         warnings.append(f"the positions span {span}: is the unit, or the scale, right?")
-    warnings += _clock_warnings(bodies)
+    lasts = max(float(body.clock[-1] - body.clock[0]) for body in bodies if body.clock.size)
+    usual = min(intervals, default=np.inf)
+    if lasts > PLAUSIBLE.longest_recording_s:
+        warnings.append(f"the recording lasts {lasts:.3g} s: is the unit of its clock right?")
+    elif usual < PLAUSIBLE.shortest_interval_s:
+        warnings.append(f"the usual interval is {usual:.3g} s: is the unit of the clock right?")
     speeds = [0.0]
     for body in bodies:
         t, x, y = (np.diff(values[:10_000]) for values in (body.clock, body.x, body.y))
@@ -74,19 +81,6 @@ def span_of(series: Sequence[Array]) -> float:
     return high - low if high >= low else 0.0
 
 
-def _clock_warnings(bodies: list[RawBody]) -> list[str]:
-    clocks = [body.clock for body in bodies if body.clock.size > 1]
-    if not clocks:
-        return []
-    last = max(float(clock[-1] - clock[0]) for clock in clocks)
-    shortest = min(float(np.median(np.diff(clock), overwrite_input=True)) for clock in clocks)
-    if last > PLAUSIBLE.longest_recording_s:
-        return [f"the recording lasts {last:.3g} s: is the unit of its clock right?"]
-    if shortest < PLAUSIBLE.shortest_interval_s:
-        return [f"the usual interval is {shortest:.3g} s: is the unit of the clock right?"]
-    return []
-
-
 def angle_warnings(raw: RawRecording) -> list[str]:
     """Return what speaks against radians where angles are taken as such though nothing says so.
 
@@ -99,12 +93,14 @@ def angle_warnings(raw: RawRecording) -> list[str]:
     """
     if not raw.bare_angle or raw.angle_unit != "rad":
         return []
-    known = [body.theta[np.isfinite(body.theta)] for body in raw.bodies if body.theta is not None]
-    for theta in known:
+    for column in (body.theta for body in raw.bodies if body.theta is not None):
+        known = np.isfinite(column)
+        theta = column if known.all() else column[known]
         with np.errstate(over="ignore"):  # a leap may be infinite
-            steps = np.abs(np.diff(theta))
-        fast = steps.size > 1 and np.median(steps) > PLAUSIBLE.usual_step_rad
+            steps = np.diff(theta)
+        np.abs(steps, out=steps)
         leaps = bool((steps > PLAUSIBLE.leap_rad).any())
+        fast = steps.size > 1 and np.median(steps, overwrite_input=True) > PLAUSIBLE.usual_step_rad
         if theta.size and (abs(theta[0]) > 6.2832 or leaps or fast):
             low, high = float(theta.min()), float(theta.max())
             return [
@@ -194,20 +190,20 @@ def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
         Names the body and the number.
     """
     for body in bodies:
-        for name, values in (("x", body.x), ("y", body.y)):
-            _refuse_beyond(body, name, values, EXTENT.farthest_m / scale)
-        known = [np.abs(one).max(where=np.isfinite(one), initial=0.0) for one in (body.x, body.y)]
-        if 0.0 < max(known) < EXTENT.nearest_m / scale:
+        most = EXTENT.farthest_m / scale
+        reach = max(_farthest(body, "x", body.x, most), _farthest(body, "y", body.y, most))
+        if 0.0 < reach < EXTENT.nearest_m / scale:
             raise InputError(
-                f"body '{body.name}' has no position that is further than {max(known):.3g} from "
+                f"body '{body.name}' has no position that is further than {reach:.3g} from "
                 "the origin, in the file's unit: no camera sees that; are these the right columns, "
                 "and is the unit right (`length_unit`)?"
             )
         if body.theta is not None:
-            _refuse_beyond(body, "angle", body.theta, EXTENT.largest_angle)
+            _farthest(body, "angle", body.theta, EXTENT.largest_angle)
 
 
-def _refuse_beyond(body: RawBody, name: str, values: Array, most: float) -> None:
+def _farthest(body: RawBody, name: str, values: Array, most: float) -> float:
+    """Return how far from zero some numbers are at most; refuse those beyond a limit."""
     known = np.isfinite(values)
     ends = [float(end(where=known, initial=0.0)) for end in (values.min, values.max)]
     number = max(ends, key=abs)
@@ -216,3 +212,4 @@ def _refuse_beyond(body: RawBody, name: str, values: Array, most: float) -> None
             f"body '{body.name}' has {number:.3g} as {name}, which cannot be one: is the file "
             "damaged? Leave the field empty, or write nan, where nothing was measured"
         )
+    return abs(number)

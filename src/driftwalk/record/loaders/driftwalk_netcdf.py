@@ -41,11 +41,10 @@ class DriftwalkLoader:
         except ValueError as error:
             raise FormatError(str(error)) from error
         extra = _extra(dataset)
-        time = np.asarray(dataset["time"].values, dtype=np.float64)
-        fields = [np.asarray(dataset[name].values, np.float64) for name in ("x", "y", "theta")]
+        time = np.array(dataset["time"].values, dtype=np.float64)
         bodies = []
         for index, name in enumerate(body_names(dataset)):
-            x, y, theta = (np.ascontiguousarray(field[:, index]) for field in fields)
+            x, y, theta = (np.array(dataset[key].values[:, index], np.float64) for key in POSE)
             further = {key: np.array(dataset[key].values[:, index], np.float64) for key in extra}
             oriented = theta if np.isfinite(theta).any() else None
             bodies.append(RawBody(name, time, x, y, oriented, extra=further))

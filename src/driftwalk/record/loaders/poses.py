@@ -237,8 +237,7 @@ class SleapCsvLoader:
         numbers = table.numbers
         raw = recording_of_poses(places, numbers.__getitem__, numbers[frame], options, OF_SLEAP)
         if track is not None:
-            (rows,) = raw.bodies
-            raw.bodies = split_bodies(rows, table.codes[track], table.labels[track])
+            raw.bodies = split_bodies(raw.bodies[0], table.codes[track], table.labels[track])
             for one in raw.bodies:
                 if not one.name and np.unique(one.clock).size < one.clock.size:
                     what = "several instances of one frame have no track"
@@ -358,7 +357,7 @@ def _clock(dataset: xr.Dataset) -> tuple[Array, str]:
     if "time" not in dataset.coords:
         return np.arange(dataset.sizes["time"], dtype=np.float64), "frame"
     unit = "s" if str(dataset.attrs.get("time_unit", "")).startswith("s") else "frame"
-    return np.asarray(_array(dataset, "time").values, dtype=np.float64), unit
+    return np.array(_array(dataset, "time").values, dtype=np.float64), unit
 
 
 LOADERS = (DeepLabCutLoader(), SleapLoader(), SleapCsvLoader(), MovementLoader())

@@ -80,13 +80,19 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
         clock = clock if alone or codes is None else order_in_body(codes)
         counts = "counts as a frame" if alone else "of a body counts as a frame, from its first on"
         notes.insert(0, f"the table has no column of times or frames: every row {counts}")
-    bodies, against = _bodies(table, reading, clock, options)
     if table.calendar == DAY:
-        bodies = count_days(bodies, clock, codes)
+        count_days(clock, codes)
+    bodies, against = _bodies(table, reading, clock, options)
+    doubts = _doubted_confidences(table, reading, options)
+    if codes is not None:
+        # From here on the bodies alone hold the columns.
+        del clock
+        table.numbers.clear()
+        bodies = split_bodies(bodies[0], codes, table.labels[reading.body_column or 0])
     on_globe = any("lon" in places for places in reading.bodies.values())
     if on_globe:
         notes.append(on_the_ground(bodies))
-    notes += _doubted_confidences(table, reading, options)
+    notes += doubts
     plane = next(iter(reading.planes.values()), None)
     bare = reading.bare_clock and bool(reading.numbers)
     return RawRecording(
@@ -247,9 +253,8 @@ def _numbers_the_rows(table: Table, column: int | None, clock: Array) -> bool:
 def _bodies(
     table: Table, reading: TableReading, clock: Array, options: ReadOptions
 ) -> tuple[list[RawBody], list[str]]:
-    """Return the bodies, and what speaks against the planes that they were laid into."""
-    column = reading.body_column
-    if column is not None and len(reading.bodies) > 1 and reading.parts is None:
+    """Return the bodies that have columns, and what speaks against the planes of these."""
+    if reading.body_column is not None and len(reading.bodies) > 1 and reading.parts is None:
         raise FormatError(
             "has several columns of x and also a column that names the body: choose one layout "
             "with `columns`",
@@ -270,10 +275,7 @@ def _bodies(
         middle.name = "0"
         middle.theta = angle_between((start.x, start.y), (end.x, end.y))
         found = {"": middle}
-    bodies = list(found.values())
-    if column is not None:
-        bodies = split_bodies(bodies[0], table.codes[column], table.labels[column])
-    return bodies, notes
+    return list(found.values()), notes
 
 
 def _body(

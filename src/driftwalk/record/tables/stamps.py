@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Codes, Floats, Integers
-from driftwalk.record.raw import MISSING, Array, RawBody
+from driftwalk.record.raw import MISSING, Array
 
 Ticks = Integers
 Texts = npt.NDArray[np.bytes_]
 
 SECOND_NS: Final = 1_000_000_000
 DAY_NS: Final = 86_400 * SECOND_NS
+_BYTES: Final = 201
+"""More bytes than a time stamp has, of some 40 as a rule; chosen by hand."""
 NO_TIME: Final = int(np.iinfo(np.int64).min)
 """In place of the nanoseconds of a row without a time."""
 
@@ -104,6 +106,9 @@ class StampReader:
     The first stamp decides the kind, and whether there is a zone; those after it have to agree.
     """
 
+    dtype: Final = f"S{_BYTES}"
+    """Type of a column of stamps in pandas, which then makes no object of each of them."""
+
     def __init__(self, *, zoned: bool = False) -> None:
         self.kind = ""
         """``MOMENT`` or ``OF_DAY``, ``""`` as long as there was no stamp."""
@@ -112,28 +117,26 @@ class StampReader:
     @property
     def calendar(self) -> str:
         """Origin of the nanoseconds: 1970 in ``UTC`` or in a ``LOCAL`` zone, or a ``DAY``."""
-        if self.kind == OF_DAY:
-            return DAY
-        return UTC if self.zoned else LOCAL
+        return DAY if self.kind == OF_DAY else UTC if self.zoned else LOCAL
 
     def read(self, texts: npt.NDArray[Any]) -> Ticks:
         """Return nanoseconds since 1970, or since midnight; `NO_TIME` where there is no stamp.
 
         Parameters
         ----------
-        texts : array of str, shape (n,)
-            Time stamps without blanks around them, or words for a missing one.
+        texts : array of str or bytes, shape (n,)
+            Time stamps without blanks around them, or words for a missing one; bytes are UTF-8, and
+            of a longer text no more than `dtype` holds.
 
         Raises
         ------
         RowError
             At a text that is no stamp, or of another kind than the first.
         """
-        # One long text would make an array as wide as it of all; a time stamp has some 40 letters.
-        wrong = (row for row, text in enumerate(texts) if len(text) > 200 or not text.isascii())
-        if (row := next(wrong, None)) is not None:
-            raise RowError(row, f"'{texts[row]:.40}' is no time stamp")
-        ascii_texts = np.asarray(texts, dtype=object).astype("S")
+        if texts.dtype.kind != "S":
+            starts = [text[:_BYTES].encode("utf-8", "replace") for text in texts.tolist()]
+            texts = np.array(starts, dtype="S")
+        ascii_texts = _ascii(np.ascontiguousarray(texts))
         found = np.full(ascii_texts.size, NO_TIME, dtype=np.int64)
         for rows in _of_one_shape(ascii_texts):
             first = ascii_texts[rows[0]].decode()
@@ -176,12 +179,33 @@ def how_to_write(text: str) -> str:
     return ": it can be read in several ways, so write it as 2024-05-31T13:30:00 or 13:30:00"
 
 
+def _ascii(texts: Texts) -> Texts:
+    """Return texts in an array as wide as the longest of them; a word that is no ASCII is empty.
+
+    Raises
+    ------
+    RowError
+        At a text that is too long, or no ASCII and no word for a missing time.
+    """
+    letters = texts.view(np.uint8).reshape(texts.size, -1)
+    highest = letters.max(axis=0, initial=0)
+    if highest.max() > 127 or highest[_BYTES - 1 :].any():
+        texts = texts.copy()
+        wrong = (letters > 127).any(axis=1) | letters[:, _BYTES - 1 :].any(axis=1)
+        for row in np.flatnonzero(wrong).tolist():
+            text = texts[row].decode("utf-8", "ignore")
+            if text not in MISSING:
+                raise RowError(row, f"'{text:.40}' is no time stamp")
+            texts[row] = b""
+    return texts.astype(f"S{1 + np.flatnonzero(highest).max(initial=0)}")
+
+
 def _of_one_shape(texts: Texts) -> list[Integers]:
     """Return the rows of each class of texts that differ in their digits alone, as they come."""
     if not texts.size:
         return []
     letters = texts.view(np.uint8).reshape(texts.size, -1)
-    digits = (letters >= ord("0")) & (letters <= ord("9"))
+    digits = letters - np.uint8(ord("0")) < 10  # those before "0" are the largest numbers
     shapes = np.ascontiguousarray(np.where(digits, np.uint8(ord("0")), letters))
     if (shapes == shapes[0]).all():
         return [np.arange(texts.size)]
@@ -272,9 +296,7 @@ def clock_of_stamps(columns: list[Ticks], origin: int | None) -> tuple[Floats, i
     total = np.sum(columns, axis=0, where=known[None, :])
     if origin is None and known.any():
         origin = int(total[np.argmax(known)])
-    clock = np.full(known.size, np.nan)
-    clock[known] = total[known] - (origin or 0)
-    return clock, origin
+    return np.where(known, total - (origin or 0), np.nan), origin
 
 
 def moment_text(nanoseconds: int, calendar: str) -> str:
@@ -291,33 +313,27 @@ def moment_text(nanoseconds: int, calendar: str) -> str:
     return f"{text}{decimals}{'Z' if calendar == UTC else ''}"
 
 
-def count_days(bodies: list[RawBody], clock: Array, codes: Codes | None) -> list[RawBody]:
-    """Return bodies whose times of day have a day more after each midnight.
+def count_days(clock: Array, codes: Codes | None) -> None:
+    """Add a day to times of day after each midnight, in place.
 
     Rows of several bodies that take turns are in the order of their times: midnight is the same row
     for all. Where bodies stand one below the other, each has its own midnights.
 
     Parameters
     ----------
-    bodies : list of RawBody
-        Their clocks in nanoseconds since midnight.
     clock : array, shape (n,)
-        The clock of all rows.
+        The clock of all rows, in nanoseconds since midnight.
     codes : array of int32, shape (n,), optional
-        Index of each row's body, in the order of the bodies; None: all share the clock.
+        Index of each row's body, from 0 on; None: all share the clock.
     """
-    if codes is None or len(bodies) == 1:
-        clocks = [counted_on(clock, DAY_NS)] * len(bodies)
-    elif int((codes[1:] != codes[:-1]).sum()) < len(bodies):
-        clocks = [counted_on(body.clock, DAY_NS) for body in bodies]
-    else:
-        counted = counted_on(clock, DAY_NS)
-        clocks = [counted[codes == code] for code in np.unique(codes)]
-    return [replace(body, clock=own) for body, own in zip(bodies, clocks, strict=True)]
+    changes = np.flatnonzero(np.diff([] if codes is None else codes)) + 1
+    in_turns = codes is not None and changes.size > codes.max()
+    for part in [clock] if in_turns else np.split(clock, changes):
+        count_on(part, DAY_NS)
 
 
-def counted_on(clock: Array, period: float) -> Array:
-    """Return a clock that starts over after each period with that period more each time.
+def count_on(clock: Array, period: float) -> None:
+    """Let a clock that starts over after each period count on, in place.
 
     A step back by more than half a period is a start.
 
@@ -330,13 +346,10 @@ def counted_on(clock: Array, period: float) -> Array:
 
     Examples
     --------
-    >>> counted_on(np.array([23.0, 1.0]), 24.0).tolist()
+    >>> clock = np.array([23.0, 1.0])
+    >>> count_on(clock, 24.0)
+    >>> clock.tolist()
     [23.0, 25.0]
     """
     known = np.flatnonzero(np.isfinite(clock))
-    starts = np.diff(clock[known]) < -0.5 * period
-    if not starts.any():
-        return clock
-    counted = clock.copy()
-    counted[known[1:]] += period * np.cumsum(starts)
-    return counted
+    clock[known[1:]] += period * np.cumsum(np.diff(clock[known]) < -0.5 * period)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -110,6 +111,22 @@ def test_a_block_of_stamps_with_and_without_decimals() -> None:
     ticks = StampReader().read(texts)
     assert ticks[-2:].tolist() == [NO_TIME, NO_TIME]
     assert np.diff(ticks[:-2]).tolist() == [250_000_000] * 8
+
+
+def test_a_dash_is_a_missing_time_in_a_file_and_in_memory(tmp_path: Path) -> None:
+    """It is no ASCII, as time stamps are."""
+    times = ["2024-05-01T12:00:00", "\u2014", "2024-05-01T12:00:02.5"]
+    of_file = load(table(tmp_path, "time,x,y", *(f"{time},0,{k}" for k, time in enumerate(times))))
+    of_memory = load({"time": times, "x": [0.0, 0.0, 0.0], "y": [0.0, 1.0, 2.0]})
+    for dataset in (of_file, of_memory):
+        np.testing.assert_array_equal(dataset["time"], [0.0, 2.5])
+        assert json.loads(dataset.attrs["counts"])["without_time"] == 1
+
+
+@pytest.mark.parametrize("text", ["2024-05-01T12:00:00." + "0" * 200, "\u00e9" * 150])
+def test_a_text_of_any_length_is_no_time_stamp(tmp_path: Path, text: str) -> None:
+    with pytest.raises(FormatError, match=f"'{text[:40]}' is no time stamp"):
+        load(table(tmp_path, "time,x,y", "2024-05-01T12:00:00,0,0", f"{text},0,1"))
 
 
 BAD = {

@@ -254,11 +254,10 @@ def _of_tidy(path: Path, options: ReadOptions) -> RawRecording:
     attributes = _attributes(path.with_name("attributes_tidy.json"))
     by_frames = _rate(attributes) is not None or options.frame_rate_hz is not None
     clock, clock_unit = (frame, "frame") if by_frames else (time, "s")
-    rows = RawBody("", clock, x, y)
-    raw = _recording([rows], lambda: known[:, None], attributes, options)
+    raw = _recording([RawBody("", clock, x, y)], lambda: known[:, None], attributes, options)
     codes, _ = number_codes(individual)
     labels = _labels(attributes.get("identities_labels"), int(codes.max()) + 1)
-    return replace(raw, bodies=split_bodies(rows, codes, labels), clock_unit=clock_unit)
+    return replace(raw, bodies=split_bodies(raw.bodies[0], codes, labels), clock_unit=clock_unit)
 
 
 CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")

@@ -27,6 +27,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.clean import codes_in_arenas, number_codes, split_bodies
+from driftwalk.record.cleaning.jumps import PART
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.loaders.json_formats import bounded_text, column_of
 from driftwalk.record.loaders.plain import HeadedFormat, described, side_by_side
@@ -92,14 +93,17 @@ def _rate_of_frames(frame: Array, time: Array) -> float | None:
     The whole number that is nearest is taken where it agrees as well: times are short of digits.
     """
     known = np.isfinite(frame) & np.isfinite(time)
-    frame, time = frame[known], time[known]
+    if not known.all():
+        frame, time = frame[known], time[known]
     if frame.size < 2 or np.ptp(time) <= 0.0:
         return None
     exact = float(np.ptp(frame) / np.ptp(time))
     if exact * 2 * HALF_DIGIT_S > 0.5 * np.ptp(time):
         return None  # too short a recording: several whole numbers agree
+    parts = [slice(start, start + PART) for start in range(0, time.size, PART)]
     for rate in filter(None, (float(round(exact)), exact)):
-        if (np.abs(time - time[0] - (frame - frame[0]) / rate) < 2 * HALF_DIGIT_S).all():
+        apart = (time[part] - time[0] - (frame[part] - frame[0]) / rate for part in parts)
+        if all((np.abs(one) < 2 * HALF_DIGIT_S).all() for one in apart):
             return rate
     return None
 
