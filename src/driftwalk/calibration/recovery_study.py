@@ -303,4 +303,4 @@ def interval_half_width(
     if start < low + room or end > high - room:
         return float("inf")
     factor = float(ndtri(0.5 + 0.5 * DETERMINED.confidence) / ndtri(0.5 + 0.5 * confidence))
-    return factor * relative_half_width(float(ends[0]), value, float(ends[1]), parameter)
+    return relative_half_width(float(ends[0]), value, float(ends[1]), parameter, factor=factor)

@@ -1,4 +1,4 @@
-"""Text files from outside, read whole or refused with the place of what is wrong: JSON and TOML.
+"""Text from outside, read whole or refused with the place of what is wrong: JSON, TOML, paths.
 
 Python's own reader of JSON lets three things pass that are no mistake of its caller: it ends with
 `RecursionError` on brackets that are nested too deeply, with `ValueError` on integers of more than
@@ -228,15 +228,15 @@ def refuse_deep(values: Any, *, path: str | Path | None = None) -> None:
 
 
 MOST_TOML_BYTES: Final = MIB
-"""Largest such file, including comments: its reader takes time that grows with the square of
-some of what it holds."""
+"""Largest TOML file, including comments, as people write studies, markers and cameras: its reader
+takes time that grows with the square of some of what it holds."""
 _TWICE: Final = re.compile(
     r"(?:Cannot declare (?P<table>\(.*?\)) twice|Cannot overwrite a value) \(at line (?P<line>\d+)"
 )
 """Message of the reader about a table, or a key, that stands twice."""
 MOST_PARTS: Final = 100
 """Parts of a key, as of a.b.c; its reader takes memory that grows with the square of their number:
-50,000 took 4 GB. Keys of these files have two."""
+50,000 took 4 GB. Keys of such a file have two."""
 _LONG_KEY: Final = re.compile(
     r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){""" + f"{MOST_PARTS}}}"
 )

@@ -1,6 +1,7 @@
 """Contents, camera and disturbances of a synthetic video, with three fixed levels of disturbance.
 
-Disturbances are shading, reflections, ripples, and bars over the markers.
+Disturbances are shading, reflections, ripples, and bars over the markers, as they are drawn. The
+levels stand apart from every tracker: they were fixed before one was written.
 """
 
 from __future__ import annotations

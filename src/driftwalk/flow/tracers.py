@@ -1,7 +1,7 @@
 """The flow field that many passive tracers show: particle tracks made a flow.
 
-False links of particle tracks are found by the normalised median test, and by the continuity of the
-track.
+Steps lead from one sample of a track to the next, never across a gap. False links of particle
+tracks are found by the normalised median test, and by the continuity of the track.
 """
 
 from __future__ import annotations

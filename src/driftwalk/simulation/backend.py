@@ -1,4 +1,7 @@
-"""Interface to the native core: prepare a model from plain numbers and datasets."""
+"""Interface to the native core: prepare a model from plain numbers and datasets.
+
+The walls of tanks and fields of view are here too, and the refusal of a flow that ends before them.
+"""
 
 from __future__ import annotations
 
@@ -316,8 +319,9 @@ def wall_depth(outline: Outline, x: Floats, y: Floats) -> Floats:
     """Return how deep points lie inside the wall [m], negative beyond it."""
     if outline.radius_m is not None:
         return np.asarray(outline.radius_m - np.hypot(x, y))
-    normal_x, normal_y, offset = wall_edges(outline).T
-    return np.asarray((offset - x[..., None] * normal_x - y[..., None] * normal_y).min(axis=-1))
+    return np.asarray(
+        np.min([far - nx * x - ny * y for nx, ny, far in wall_edges(outline)], axis=0)
+    )
 
 
 def require_cover(flow: xr.Dataset, tank: Tank) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import index
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -135,7 +136,7 @@ def plain_camera(study: Study) -> Camera:
 
 def replicate_keys(study: Study, replicates: int | None, seed: int | None) -> tuple[int, Keys]:
     """Return the seed and the keys of the replicates, those of the study where none are given."""
-    count = study.simulation.replicates if replicates is None else replicates
+    count = index(study.simulation.replicates if replicates is None else replicates)
     if count < 1:
         raise InputError(f"replicates must be at least 1, got {count}")
     chosen = study.simulation.seed if seed is None else seed

@@ -281,6 +281,8 @@ def test_what_contradicts() -> None:
         dw.simulate("active")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="replicates must be at least 1"):
         dw.simulate(active(), **known, replicates=0)
+    with pytest.raises(TypeError, match="integer"):
+        dw.simulate(active(), **known, replicates=1.5)  # type: ignore[arg-type]
 
 
 def test_worlds_without_numbers() -> None:

@@ -15,7 +15,7 @@ from driftwalk.schema import build_dataset, check_dataset, described
 from driftwalk.schema.check import check_contents
 from driftwalk.schema.description import Variable
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
-from driftwalk.schema.trajectory import build_steps
+from driftwalk.schema.trajectory import build_steps, require_increasing
 
 
 def steps() -> xr.Dataset:
@@ -127,6 +127,11 @@ def test_a_file_of_another_version_is_refused_in_words(version: int | str, tmp_p
     with pytest.raises(FormatError, match=said) as caught:
         open_netcdf(path)
     assert caught.value.path == path
+
+
+def test_unsigned_times_that_go_backwards_are_refused() -> None:
+    with pytest.raises(InputError, match="time does not increase at sample 2"):
+        require_increasing(np.array([0, 2, 1, 3], np.uint64))
 
 
 def test_a_file_of_another_program_need_not_state_a_version(tmp_path: Path) -> None:

@@ -75,12 +75,17 @@ def _half_width(column: Floats, parameter: Parameter) -> float:
     return relative_half_width(start, value, end, parameter)
 
 
-def relative_half_width(start: float, value: float, end: float, parameter: Parameter) -> float:
-    """Return half an interval over the value, or over a small part of the range if that is more."""
+def relative_half_width(
+    start: float, value: float, end: float, parameter: Parameter, *, factor: float = 1.0
+) -> float:
+    """Return half an interval over the value, or over a small part of the range if that is more.
+
+    The interval is made longer by a factor, as for another confidence.
+    """
     if parameter.scale == "log":
-        return 0.5 * float(np.log(end / start))
+        return 0.5 * factor * float(np.log(end / start))
     size = max(abs(value), DETERMINED.small_part * (parameter.high - parameter.low))
-    return 0.5 * (end - start) / size
+    return 0.5 * factor * (end - start) / size
 
 
 class Profiles(NamedTuple):

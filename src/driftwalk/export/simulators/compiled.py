@@ -1,4 +1,4 @@
-"""The force as C, for simulators whose plugins are compiled: its files, and its proof."""
+"""The export to simulators whose plugins are compiled: the force as C, its files, its proof."""
 
 from __future__ import annotations
 

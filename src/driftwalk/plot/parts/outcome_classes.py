@@ -628,7 +628,7 @@ def _pinned(
 
 
 POLE_COLORS: Final = {1: "#C1121F", -1: "#FFFFFF"}
-"""No colour of an assembly."""
+"""Of the bars along magnetic faces: N red, S white; no colour of an assembly."""
 
 
 class PoleBarPolicy(NamedTuple):

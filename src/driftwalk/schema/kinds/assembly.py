@@ -1,4 +1,4 @@
-"""Datasets of runs of many blocks: the runs themselves, their outcomes, their courses in time."""
+"""Datasets of runs of many blocks: the runs, their paths, attraction, classified recordings."""
 
 from __future__ import annotations
 
