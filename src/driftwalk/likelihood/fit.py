@@ -203,7 +203,7 @@ def fit_motion(
         parameters = _parameter_facts(search, law.mode, restricted, ready)
         for rival in law.rivals:
             parameters = _with_rival(parameters, search, rival, ready)
-        shape = laws.alternatives.shape_change(law.mode)
+        shape = laws.confounders.shape_change(law.mode)
     with solved(reason):
         stirring = (
             shared_stirring(ready, restricted.point, course)
@@ -266,9 +266,7 @@ def _laws_with_modes(
         laws, law = _laws_of(search, assumptions, starts, weights, ready)
         if wanted != "none":
             # Under the right law the line may stand out that did not under the paper's.
-            modes = modes_at(
-                laws.search, law.base, laws.alternatives.shape_change(law.base), wanted
-            )
+            modes = modes_at(laws.search, law.base, laws.confounders.shape_change(law.base), wanted)
         if modes.start is None:
             return search, laws, law, modes
     search = with_layers(search, modes.layers)
