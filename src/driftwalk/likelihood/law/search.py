@@ -16,8 +16,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.units import in_percent
-from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, DRAGS, NUMBERS, Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.law.candidate_laws import DRAG_SHAPES, DRAGS, NUMBERS
 from driftwalk.likelihood.law.confounders import LAW_NUMBERS, Confounders, number_sentence
 from driftwalk.likelihood.law.force_law import FLOATING, Assumptions
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult, is_retained
