@@ -51,7 +51,7 @@ from driftwalk.likelihood.refuse import (
 from driftwalk.likelihood.spline import Spline, lay_spline
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import fitted_value
-from driftwalk.schema.tracker_errors import without_outliers
+from driftwalk.schema.outliers import without_outliers
 from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
