@@ -21,7 +21,7 @@ from driftwalk.assembly.lattice.joined_faces import (
     smallest_distance,
 )
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
-from driftwalk.assembly.outcomes.class_names import listed_classes, listed_shapes
+from driftwalk.assembly.outcomes.outcome_classes import listed_classes, listed_shapes
 from driftwalk.assembly.outcomes.steady_state import (
     bridges_of,
     clustering,

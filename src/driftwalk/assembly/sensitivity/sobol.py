@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.class_names import listed_classes
 from driftwalk.assembly.outcomes.distribution import is_complete, sampling_variance
+from driftwalk.assembly.outcomes.outcome_classes import listed_classes
 from driftwalk.assembly.runs.plan import chirality_of
 from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.assembly.outcomes.class_names import target_class
 from driftwalk.assembly.outcomes.distribution import with_limits
+from driftwalk.assembly.outcomes.outcome_classes import target_class
 from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS, KEYS, Axes, make_axes
