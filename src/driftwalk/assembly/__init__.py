@@ -13,6 +13,7 @@ from driftwalk.assembly.live_world import LiveEvent, LiveTank
 from driftwalk.assembly.outcome_posterior.infer import infer_outcomes
 from driftwalk.assembly.outcome_posterior.problem import check_outcomes
 from driftwalk.assembly.outcome_posterior.records import read_outcomes
+from driftwalk.assembly.outcomes.bond_kinetics import rate_interval
 from driftwalk.assembly.outcomes.components import (
     Alignment,
     disconnected_alignment,
@@ -42,7 +43,7 @@ from driftwalk.assembly.outcomes.outcome_classes import (
     world_class,
 )
 from driftwalk.assembly.outcomes.sizes import assembly_sizes
-from driftwalk.assembly.outcomes.steady_state import rate_interval, steady_state
+from driftwalk.assembly.outcomes.steady_state import steady_state
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
 from driftwalk.assembly.pull.force_tables import attraction
 from driftwalk.assembly.recordings import classify
