@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
+from driftwalk.core.progress import Course, share_of_search, tell_nobody
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.series import Series

@@ -29,7 +29,7 @@ from driftwalk.assembly.outcomes.outcome_classes import sort_classes
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.progress import tell_nobody
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import is_one_assembly

@@ -26,7 +26,7 @@ from driftwalk.assembly.sensitivity.settings import (
 )
 from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.core.text_files import parse_json
 from driftwalk.schema.check import build_dataset, described
 from driftwalk.schema.kinds.flow import FLOW_SERIES

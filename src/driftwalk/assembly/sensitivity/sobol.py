@@ -32,7 +32,7 @@ from driftwalk.assembly.sensitivity.settings import (
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import check_confidence
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.schema.check import build_dataset, described, require_kind
 from driftwalk.schema.kinds import KINDS
 from driftwalk.sweep import threads_of_unit

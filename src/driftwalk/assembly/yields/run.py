@@ -28,7 +28,7 @@ from driftwalk.assembly.yields.selection import (
 )
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import proportion_interval
-from driftwalk.core.run_stages import Progress, tell_nobody
+from driftwalk.core.progress import Progress, tell_nobody
 from driftwalk.schema.check import build_dataset
 from driftwalk.sweep import threads_of_unit
 

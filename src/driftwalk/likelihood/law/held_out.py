@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.run_stages import Course, tell_nobody
+from driftwalk.core.progress import Course, tell_nobody
 from driftwalk.likelihood.filter.filter_pass import log_densities
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
