@@ -139,7 +139,7 @@ def available_instruction_sets() -> list[str]: ...
 # --- self-assembly ------------------------------------------------------------------------------
 # Start poses [m, m, rad] of shape (worlds, blocks, 3), and how many blocks of each world found a
 # place; `glued`: cells (n, 2) of bodies of n blocks each.
-# Tables of the forces between blocks, see `driftwalk.assembly.pull.tables`.
+# Tables of the forces between blocks, see `driftwalk.assembly.pull.force_tables`.
 class Pull:
     def __init__(
         self,

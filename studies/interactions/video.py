@@ -22,7 +22,7 @@ import xarray as xr
 
 import driftwalk as dw
 from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
-from driftwalk.assembly.outcomes.steady_state import bridges_of
+from driftwalk.assembly.outcomes.bond_kinetics import bridges_of
 from driftwalk.cli.main import main as driftwalk
 
 RECORDINGS: Final = 40

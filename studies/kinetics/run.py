@@ -20,9 +20,9 @@ import numpy as np
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.assembly.chains.estimate import empirical_shares
 from driftwalk.assembly.chains.hidden import FORMS, GRID_STEPS, fit, shares
 from driftwalk.assembly.chains.histories import histories
+from driftwalk.assembly.chains.transition_rates import empirical_shares
 
 SETTINGS = tuple(product((0.0, 0.5, 1.0, 1.5), (0.2, 0.55, 1.2)))
 TIMES = np.array([60.0, 120.0, 300.0])

@@ -20,7 +20,7 @@ from twin_assembly import SIDE, Floats, study, swirl
 import driftwalk as dw
 from driftwalk import _core
 from driftwalk.assembly.lattice.joined_faces import face_table
-from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Assembly
 from driftwalk.simulation.backend import Camera, native_model

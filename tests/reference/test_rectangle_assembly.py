@@ -10,7 +10,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.assembly import LiveTank, assemble, assembly_path
-from driftwalk.assembly.outcomes.class_names import overlap_depth
+from driftwalk.assembly.outcomes.outcome_classes import overlap_depth
 from driftwalk.core.errors import InputError
 from driftwalk.schema import build_flow_field
 from driftwalk.simulation import Start, simulate

@@ -7,7 +7,6 @@ import pytest
 from chain_runs import CLASSES, chain_runs
 from scipy.stats import binom
 
-from driftwalk.assembly.chains.estimate import Replicate, empirical_shares
 from driftwalk.assembly.chains.hidden import FORMS, Form, fit, passage, shares
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.chains.mixing import (
@@ -16,6 +15,7 @@ from driftwalk.assembly.chains.mixing import (
     equal_rates,
     judge_mixing,
 )
+from driftwalk.assembly.chains.transition_rates import Replicate, empirical_shares
 from driftwalk.sweep import grid, run_sweep
 
 CHAINS = 400

@@ -1,6 +1,6 @@
 """Self-assembly of many blocks: outcomes, their uncertainty, and their dependence on the model."""
 
-from driftwalk.assembly.chains.estimate import check_kinetics, kinetics
+from driftwalk.assembly.chains.transition_rates import check_kinetics, kinetics
 from driftwalk.assembly.control.live import LiveControl
 from driftwalk.assembly.control.modes import Modes, ModeSource, make_modes
 from driftwalk.assembly.control.plan import check_control, plan_control
@@ -13,16 +13,7 @@ from driftwalk.assembly.live_world import LiveEvent, LiveTank
 from driftwalk.assembly.outcome_posterior.infer import infer_outcomes
 from driftwalk.assembly.outcome_posterior.problem import check_outcomes
 from driftwalk.assembly.outcome_posterior.records import read_outcomes
-from driftwalk.assembly.outcomes.class_names import (
-    class_cells,
-    class_name,
-    class_shapes,
-    kind_classes,
-    merge_chirality,
-    outcome_classes,
-    sort_classes,
-    world_class,
-)
+from driftwalk.assembly.outcomes.bond_kinetics import rate_interval
 from driftwalk.assembly.outcomes.components import (
     Alignment,
     disconnected_alignment,
@@ -41,10 +32,20 @@ from driftwalk.assembly.outcomes.l1 import (
     l1_noise_floor,
     pairwise_l1,
 )
+from driftwalk.assembly.outcomes.outcome_classes import (
+    class_cells,
+    class_name,
+    class_shapes,
+    kind_classes,
+    merge_chirality,
+    outcome_classes,
+    sort_classes,
+    world_class,
+)
 from driftwalk.assembly.outcomes.sizes import assembly_sizes
-from driftwalk.assembly.outcomes.steady_state import rate_interval, steady_state
+from driftwalk.assembly.outcomes.steady_state import steady_state
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
-from driftwalk.assembly.pull.tables import attraction
+from driftwalk.assembly.pull.force_tables import attraction
 from driftwalk.assembly.recordings import classify
 from driftwalk.assembly.runs.dataset import path_recording
 from driftwalk.assembly.runs.draws import draw_parameters, has_uncertainty, interaction_quantiles

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, PARTING, BondGraph, face_table
-from driftwalk.assembly.outcomes.class_names import disc_class
-from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.outcomes.outcome_classes import disc_class
+from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import make_plan, start_poses, steps_of
 from driftwalk.assembly.runs.start import glued_cells, require_bonds, require_room

@@ -21,13 +21,8 @@ from driftwalk.assembly.lattice.joined_faces import (
     smallest_distance,
 )
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
-from driftwalk.assembly.outcomes.class_names import listed_classes, listed_shapes
-from driftwalk.assembly.outcomes.steady_state import (
-    bridges_of,
-    clustering,
-    rate_interval,
-    rate_variables,
-)
+from driftwalk.assembly.outcomes.bond_kinetics import RATE_CONFIDENCE, bond_rate, recorded_rates
+from driftwalk.assembly.outcomes.outcome_classes import listed_classes, listed_shapes
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.schema import body_names, check_trajectory
@@ -38,8 +33,6 @@ if TYPE_CHECKING:
 
 
 UNKNOWN: Final = -1
-RATE_CONFIDENCE: Final = 0.9
-"""Probability with which an interval of a rate holds, as elsewhere."""
 
 
 def classify(
@@ -216,7 +209,7 @@ def _dataset(
     # A sample holds until the next one, if that comes in time.
     lasts = np.append(np.minimum(np.diff(poses.time), rules.hold), 0.0)
     lasts = np.where(sound, lasts, 0.0)
-    rates = _rates(history, outcome, lasts, classes)
+    rates = recorded_rates(history, outcome, lasts, classes)
     data: dict[str, Any] = {
         "outcome": ("time", outcome),
         "assembly": (("time", "body"), assembly),
@@ -257,64 +250,9 @@ def _dataset(
             "unknown_samples": int((~sound).sum()),
             "known_s": float(lasts.sum()),
             "rate_confidence": RATE_CONFIDENCE,
-            **_bond_rate(rates, outcome, lasts, classes),
+            **bond_rate(rates, outcome, lasts, classes),
         },
     )
-
-
-def _rates(
-    history: JoinHistory, outcome: npt.NDArray[np.int32], lasts: Floats, classes: Sequence[str]
-) -> dict[str, Any]:
-    """Return how often blocks joined and parted in each class, over the time in it.
-
-    Events while the class is not known are left out, as that time is.
-    """
-    # What came apart at a sample did so before what joined there.
-    events = [(event, "parting") for event in history.split]
-    events += [(event, "joining") for event in history.joined]
-    events.sort(key=lambda one: one[0].sample)
-    spent = np.where(outcome[:, None] == np.arange(len(classes)), lasts[:, None], 0.0)
-    clock = np.vstack([np.zeros(len(classes)), np.cumsum(spent, axis=0)])
-    before = _places(history.outcome[:1], classes)[0]
-    when: dict[str, list[list[float]]] = {
-        kind: [[] for _ in classes] for kind in ("joining", "parting")
-    }
-    for event, kind in events:
-        if outcome[max(event.sample - 1, 0)] != UNKNOWN:
-            when[kind][before].append(clock[event.sample, before])
-        before = _places([event.outcome], classes)[0]
-    data: dict[str, Any] = {}
-    for kind, moments in when.items():
-        # Bonds break independently of each other; blocks that parted lately are near each other.
-        clusters = [
-            clustering(one, time, confidence=RATE_CONFIDENCE) if kind == "joining" else 1.0
-            for one, time in zip(moments, clock[-1], strict=True)
-        ]
-        data |= rate_variables(
-            kind,
-            [len(one) for one in moments],
-            clock[-1],
-            confidence=RATE_CONFIDENCE,
-            clusters=clusters,
-        )
-    return data
-
-
-def _bond_rate(
-    rates: dict[str, Any], outcome: npt.NDArray[np.int32], lasts: Floats, classes: Sequence[str]
-) -> dict[str, float]:
-    """Return the partings per bond and second in classes without loops, where there are any."""
-    bonds = np.array([bridges_of(name) for name in classes])
-    time = float((lasts * np.where(outcome >= 0, bonds[outcome], 0)).sum())
-    if time == 0.0:
-        return {}
-    count = int(rates["parting_count"][1][bonds > 0].sum())
-    low, high = rate_interval(count, time, confidence=RATE_CONFIDENCE)
-    return {
-        "bond_rate_per_s": count / time,
-        "bond_rate_low_per_s": float(low),
-        "bond_rate_high_per_s": float(high),
-    }
 
 
 def _places(names: Iterable[str], listed: Sequence[str]) -> list[int]:

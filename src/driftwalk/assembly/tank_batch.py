@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.join_history import LatticeWorld
-from driftwalk.assembly.outcomes.class_names import disc_class
-from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.outcomes.outcome_classes import disc_class
+from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import (
     Backend,

@@ -29,8 +29,8 @@ from driftwalk.comparison.aspects import (
 from driftwalk.conditions import Conditions
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import map_in_threads
+from driftwalk.core.progress import Progress, tell_nobody
 from driftwalk.core.random_streams import trial_in, world_keys
-from driftwalk.core.run_stages import Progress, tell_nobody
 from driftwalk.motion import MotionModel, Worlds
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema import Parameter

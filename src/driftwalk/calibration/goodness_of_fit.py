@@ -17,7 +17,7 @@ from driftwalk.calibration.problem import FlowSource, Problem, limits_of, prepar
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.schema import Track
 from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR, is_explained
 from driftwalk.simulation.series import flow_since

@@ -24,9 +24,10 @@ from driftwalk.calibration.run import calibrate, check_recording
 from driftwalk.conditions import study_in_arena
 from driftwalk.conditions.camera import study_as_seen
 from driftwalk.core.arrays import Floats
+from driftwalk.core.calibration_stages import CALIBRATION_STAGES
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.progress import tell_nobody
 from driftwalk.core.random_streams import RecoveryStream
-from driftwalk.core.run_stages import CALIBRATION_STAGES, tell_nobody
 from driftwalk.model import Study, apply_overrides
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel, known_values, simulate_motion
 from driftwalk.schema import body_track, build_trajectory

@@ -21,8 +21,8 @@ from driftwalk.conditions import (
 )
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.progress import tell_nobody
 from driftwalk.core.random_streams import trial_in, world_keys
-from driftwalk.core.run_stages import tell_nobody
 from driftwalk.motion import BlockModel, Details, MotionModel, Parameter, Scores, score_worlds
 from driftwalk.schema import Track, body_track
 from driftwalk.simulation.backend import Camera

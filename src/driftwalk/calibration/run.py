@@ -29,10 +29,11 @@ from driftwalk.calibration.stationarity import stationarity_of
 from driftwalk.calibration.warnings import OWN_FLOW, fit_disagreements, wall_warning
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import jump_warnings, study_in_arena, unstated_warning
+from driftwalk.core.calibration_stages import share_of_windows
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.core.processors import run_in_background
-from driftwalk.core.run_stages import share_of_windows, tell_nobody
+from driftwalk.core.progress import tell_nobody
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.motion.protocol import ScoresItself
 from driftwalk.schema.answers.facts import taken_keys, taken_names

@@ -18,8 +18,8 @@ import numpy as np
 from driftwalk.cluster.address import ClusterAddress, begin_jobs
 from driftwalk.core.errors import ClusterError, InputError, reason_of
 from driftwalk.core.extras import show_dask
+from driftwalk.core.progress import tell_nobody
 from driftwalk.core.provenance import package_versions
-from driftwalk.core.run_stages import tell_nobody
 from driftwalk.flow import uniform_flow
 from driftwalk.model import Study, Tank
 from driftwalk.simulation import simulate

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.schema.tracker_errors import estimate_tracking_noise, noise_bound
+from driftwalk.schema.tracking_noise import estimate_tracking_noise, noise_bound
 from driftwalk.simulation.backend import Camera
 
 if TYPE_CHECKING:

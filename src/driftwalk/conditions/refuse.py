@@ -15,7 +15,7 @@ from driftwalk.conditions.camera import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.record import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.schema import Track, body_names, body_track
-from driftwalk.schema.tracker_errors import mistakes_warning, without_far_outliers
+from driftwalk.schema.outliers import mistakes_warning, without_far_outliers
 from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:

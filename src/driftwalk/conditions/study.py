@@ -15,7 +15,7 @@ from driftwalk.schema import body_track
 from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import kind_name
-from driftwalk.schema.tracker_errors import noise_reach
+from driftwalk.schema.tracking_noise import noise_reach
 from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> Non
     """Refuse a tank that does not hold the recorded positions.
 
     The camera's noise shows a body at the wall beyond it: by four standard deviations at most, of
-    the study's noise or of the one that is estimated (`noise_reach` of `schema.tracker_errors`). A
+    the study's noise or of the one that is estimated (`noise_reach` of `schema.tracking_noise`). A
     simulated recording in its own tank is not looked at: the body kept to it.
 
     Parameters

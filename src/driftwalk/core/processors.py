@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any, TypeVar
 
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 
 ItemT = TypeVar("ItemT")
 FoundT = TypeVar("FoundT")

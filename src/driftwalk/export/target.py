@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.progress import tell_nobody
 
 
 @dataclass(frozen=True)

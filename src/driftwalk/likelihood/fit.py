@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
+from driftwalk.core.progress import Course, share_of_search, tell_nobody
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.series import Series
@@ -203,7 +203,7 @@ def fit_motion(
         parameters = _parameter_facts(search, law.mode, restricted, ready)
         for rival in law.rivals:
             parameters = _with_rival(parameters, search, rival, ready)
-        shape = laws.alternatives.shape_change(law.mode)
+        shape = laws.confounders.shape_change(law.mode)
     with solved(reason):
         stirring = (
             shared_stirring(ready, restricted.point, course)
@@ -266,9 +266,7 @@ def _laws_with_modes(
         laws, law = _laws_of(search, assumptions, starts, weights, ready)
         if wanted != "none":
             # Under the right law the line may stand out that did not under the paper's.
-            modes = modes_at(
-                laws.search, law.base, laws.alternatives.shape_change(law.base), wanted
-            )
+            modes = modes_at(laws.search, law.base, laws.confounders.shape_change(law.base), wanted)
         if modes.start is None:
             return search, laws, law, modes
     search = with_layers(search, modes.layers)

@@ -12,8 +12,9 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.flow.grid import Grid
-from driftwalk.likelihood.filter.parameters import PULSES, STRENGTHS, Amplitudes, Point
+from driftwalk.likelihood.filter.parameters import Amplitudes, Point
 from driftwalk.likelihood.filter.series import Series, layer_strengths, mode_amplitudes
+from driftwalk.likelihood.law.candidate_laws import PULSES, STRENGTHS
 from driftwalk.likelihood.spline import Spline
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats
-from driftwalk.likelihood.filter.parameters import INTENSITIES, Point
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.law.candidate_laws import INTENSITIES
 from driftwalk.likelihood.law.force_law import inertia_facts, inertia_of, number_facts
 from driftwalk.likelihood.newton import Mode, known_numbers_variance
 from driftwalk.likelihood.prior import PRIOR

@@ -13,10 +13,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.progress import tell_nobody
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
-from driftwalk.likelihood.filter.parameters import NUMBERS, Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.law.candidate_laws import NUMBERS
 from driftwalk.likelihood.prior import LEVER, MOST_FACTOR, Prior, Weights
 from driftwalk.likelihood.refuse import BREAKDOWN, cholesky
 

@@ -32,6 +32,14 @@ from driftwalk.likelihood.law.force_law import effective_logs, stored_numbers
 from driftwalk.likelihood.measured_flow import MeasuredFlow, measured_flow
 from driftwalk.likelihood.measured_series import stored_flow
 from driftwalk.likelihood.prior import Earlier, Prior, Weights
+from driftwalk.likelihood.recording_artifacts.dropped_frames import (
+    DroppedFrames,
+    find_dropped_frames,
+    places_of,
+    with_gaps,
+)
+from driftwalk.likelihood.recording_artifacts.noise_free import AddedNoise, with_least_noise
+from driftwalk.likelihood.recording_artifacts.smoothed import require_raw
 from driftwalk.likelihood.refuse import (
     LIMIT,
     require_length,
@@ -41,17 +49,9 @@ from driftwalk.likelihood.refuse import (
     require_usable,
 )
 from driftwalk.likelihood.spline import Spline, lay_spline
-from driftwalk.likelihood.tracker_errors.dropped import (
-    DroppedFrames,
-    find_dropped_frames,
-    places_of,
-    with_gaps,
-)
-from driftwalk.likelihood.tracker_errors.noise_free import AddedNoise, with_least_noise
-from driftwalk.likelihood.tracker_errors.smoothed import require_raw
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import fitted_value
-from driftwalk.schema.tracker_errors import without_outliers
+from driftwalk.schema.outliers import without_outliers
 from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:

@@ -18,7 +18,8 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
-from driftwalk.likelihood.filter.parameters import NUMBERS, Point
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.law.candidate_laws import NUMBERS
 from driftwalk.likelihood.measured_flow import MeasuredFlow
 from driftwalk.likelihood.spline import penalties
 

@@ -19,8 +19,8 @@ from driftwalk.calibration.recovery_study import (
 )
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.progress import tell_nobody
 from driftwalk.core.random_streams import RecoveryStream
-from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.units import in_percent
 from driftwalk.flow import random_tank_flow
 from driftwalk.likelihood.fit import fit_motion

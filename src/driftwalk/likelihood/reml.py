@@ -38,8 +38,9 @@ import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
-from driftwalk.likelihood.filter.parameters import INTENSITIES, Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import FILTER, Series
+from driftwalk.likelihood.law.candidate_laws import INTENSITIES
 from driftwalk.likelihood.newton import Mode, ModeSearch, known_numbers_variance
 from driftwalk.likelihood.refuse import cholesky
 from driftwalk.likelihood.spline import Spline, basis_matrix

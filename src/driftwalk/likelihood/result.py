@@ -21,10 +21,11 @@ import numpy.typing as npt
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
-from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.fitted_modes import mode_variables, strength_variables
 from driftwalk.likelihood.interval_inflation import open_where_undetermined, parameter_covariance
+from driftwalk.likelihood.law.candidate_laws import DRAG_SHAPES
 from driftwalk.likelihood.law.force_law import Assumptions
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.preparation import PreparedRecordings, spline_of

@@ -11,7 +11,7 @@ from driftwalk.likelihood.flow_intervals import Intervals
 from driftwalk.likelihood.law.search import LAW
 from driftwalk.likelihood.refuse import LENGTH, LIMIT, in_words, needed_duration
 from driftwalk.schema.answers.facts import is_open
-from driftwalk.schema.tracker_errors import mistakes_warning
+from driftwalk.schema.outliers import mistakes_warning
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

@@ -13,7 +13,7 @@ from shlex import quote
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.progress import tell_nobody
 from driftwalk.core.text_files import json_value
 from driftwalk.page import parts
 from driftwalk.page.html import page_frame

@@ -19,7 +19,7 @@ from driftwalk.record.cleaning.jumps import (
 )
 from driftwalk.record.info import describe
 from driftwalk.record.io import load, readable_formats
-from driftwalk.schema.tracker_errors import estimate_tracking_noise, noise_bound
+from driftwalk.schema.tracking_noise import estimate_tracking_noise, noise_bound
 from driftwalk.schema.trajectory import save_trajectory
 
 __all__ = [

@@ -13,7 +13,7 @@ from driftwalk.core.text_files import json_value, parse_json
 from driftwalk.record.arena import fit_circle
 from driftwalk.record.raw import Array
 from driftwalk.schema import Track, body_names, body_track, check_trajectory
-from driftwalk.schema.tracker_errors import estimate_tracking_noise
+from driftwalk.schema.tracking_noise import estimate_tracking_noise
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -30,7 +30,8 @@ from driftwalk.record.pose import join_markers, two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN, loaders, origin_of
 from driftwalk.schema import Track, build_trajectory
-from driftwalk.schema.tracker_errors import noise_reach, without_far_outliers
+from driftwalk.schema.outliers import without_far_outliers
+from driftwalk.schema.tracking_noise import noise_reach
 
 if TYPE_CHECKING:
     import numpy.typing as npt

@@ -200,7 +200,7 @@ class AssemblyWork:
     ) -> tuple[xr.Dataset, xr.Dataset | None]:
         """Return the distribution of a set of runs and, beyond 8 blocks, their sizes."""
         from driftwalk.assembly import assembly_sizes, outcome_distribution
-        from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
+        from driftwalk.assembly.outcomes.outcome_classes import MOST_BLOCKS
 
         confidence = self.study.assembly.confidence
         distribution = outcome_distribution(assembly, confidence=confidence)

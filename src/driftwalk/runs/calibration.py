@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from driftwalk.core.calibration_stages import CALIBRATION_STAGES
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.run_stages import CALIBRATION_STAGES, tell_nobody
+from driftwalk.core.progress import tell_nobody
 from driftwalk.runs.resumable_run import dataset_hash, naming_recording
 from driftwalk.schema.parameters import unit_suffix
 from driftwalk.schema.runs import run_kind

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.progress import tell_nobody
 from driftwalk.runs.finished_run import run_folder
 from driftwalk.runs.resumable_run import dataset_hash
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_stages import Course, tell_nobody
+from driftwalk.core.progress import Course, tell_nobody
 from driftwalk.schema.description import SOURCE_WARNINGS
 from driftwalk.schema.kinds import find_kind
 from driftwalk.schema.runs import RunContents, run_kind

@@ -33,7 +33,7 @@ from driftwalk.assembly.lattice.joined_faces import (
     PairPoses,
 )
 from driftwalk.assembly.lattice.polyomino import Chirality, name_of, neighbours, require_chirality
-from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
+from driftwalk.assembly.outcomes.outcome_classes import MOST_BLOCKS
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import described
 from driftwalk.schema.shapes import Cell, moved_to_origin

@@ -45,7 +45,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import FaceTable
-from driftwalk.assembly.pull.tables import BlockPull, block_pull
+from driftwalk.assembly.pull.force_tables import BlockPull, block_pull
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import wall_edges
 from twin.block import TwinModel, drag, force_normals, next_force, push_of_water

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.pull.tables import BlockPull, RadialForce, cell_start
+from driftwalk.assembly.pull.force_tables import BlockPull, RadialForce, cell_start
 from twin.body import Floats, cross
 
 

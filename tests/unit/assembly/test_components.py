@@ -10,8 +10,8 @@ import pytest
 import xarray as xr
 from scipy.linalg import eigh
 
-from driftwalk.assembly.outcomes.class_names import outcome_classes
 from driftwalk.assembly.outcomes.components import disconnected_alignment, principal_components
+from driftwalk.assembly.outcomes.outcome_classes import outcome_classes
 from driftwalk.core.errors import InputError
 
 CLASSES = list(outcome_classes(4))

@@ -19,7 +19,7 @@ from driftwalk.assembly import (
     outcome_distribution,
     sort_classes,
 )
-from driftwalk.assembly.outcomes.class_names import CONTACT_POLICY, disc_class
+from driftwalk.assembly.outcomes.outcome_classes import CONTACT_POLICY, disc_class
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.outcome_classes import class_cells, disc_places
 from driftwalk.schema.shapes import contacts_of

@@ -9,13 +9,13 @@ import pytest
 import xarray as xr
 from scipy.stats import binom, binomtest
 
-from driftwalk.assembly.outcomes.class_names import outcome_classes
 from driftwalk.assembly.outcomes.distribution import (
     class_at,
     class_names,
     outcome_distribution,
     sampling_variance,
 )
+from driftwalk.assembly.outcomes.outcome_classes import outcome_classes
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import difference_interval, proportion_interval
 

@@ -11,8 +11,8 @@ from hypothesis import given, settings, strategies as st
 from lattice_runs import Run, random_run, raw_arrays, small_name
 
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
-from driftwalk.assembly.outcomes.class_names import outcome_classes, sort_classes
 from driftwalk.assembly.outcomes.distribution import class_at
+from driftwalk.assembly.outcomes.outcome_classes import outcome_classes, sort_classes
 from driftwalk.core.errors import InputError
 
 Chirality = Literal["merged", "distinct"]

@@ -15,12 +15,6 @@ import xarray as xr
 from chain_runs import CLASSES, RATES, chain_runs, rate_matrix
 
 import driftwalk as dw
-from driftwalk.assembly.chains.estimate import (
-    _other_blocks,
-    completion,
-    empirical_shares,
-    spread_of_known,
-)
 from driftwalk.assembly.chains.hidden import (
     FORMS,
     Form,
@@ -32,6 +26,12 @@ from driftwalk.assembly.chains.hidden import (
 )
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.chains.mixing import holm, mixing_tests, score
+from driftwalk.assembly.chains.transition_rates import (
+    _other_blocks,
+    completion,
+    empirical_shares,
+    spread_of_known,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.schema.answers.kinetics import kinetics_answer
 from driftwalk.schema.answers.parts import lines_of

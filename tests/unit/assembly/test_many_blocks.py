@@ -15,7 +15,7 @@ from driftwalk.assembly import assembly_sizes, replay_events
 from driftwalk.assembly.lattice import events as module
 from driftwalk.assembly.lattice.events import replay_contacts
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.outcomes.class_names import sort_classes, world_class
+from driftwalk.assembly.outcomes.outcome_classes import sort_classes, world_class
 from driftwalk.assembly.outcomes.sizes import compactness
 from driftwalk.core.errors import InputError
 from driftwalk.schema import build_trajectory

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 from lattice_runs import form, random_run, raw_arrays
 
-from driftwalk.assembly.outcomes.class_names import (
+from driftwalk.assembly.outcomes.outcome_classes import (
     class_cells,
     class_name,
     class_shapes,

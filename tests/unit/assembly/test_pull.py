@@ -14,8 +14,8 @@ from scipy.special import k0, k1
 
 import driftwalk as dw
 from driftwalk.assembly import assemble
+from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.assembly.pull.magnets import coaxial_force, magnet_energy
-from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.plan import make_plan, simulate_rows, start_poses
 from driftwalk.model.interaction import Magnet
 

@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 from scipy.stats import binom, binomtest, norm
 
-from driftwalk.assembly.outcomes.class_names import outcome_classes
 from driftwalk.assembly.outcomes.distribution import class_at
+from driftwalk.assembly.outcomes.outcome_classes import outcome_classes
 from driftwalk.assembly.outcomes.survival import class_times, survival_curve
 from driftwalk.core.errors import InputError
 

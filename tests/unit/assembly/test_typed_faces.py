@@ -14,7 +14,7 @@ import driftwalk as dw
 from driftwalk.assembly import assemble, kind_classes
 from driftwalk.assembly.lattice.events import replay_events
 from driftwalk.assembly.lattice.joined_faces import FaceTable, face_table
-from driftwalk.assembly.outcomes.class_names import _coloured
+from driftwalk.assembly.outcomes.outcome_classes import _coloured
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.model import Assembly, Study, apply_overrides, parse_study, read_binding
 

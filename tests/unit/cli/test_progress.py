@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from driftwalk.cli.terminal.progress import ProgressReporter
-from driftwalk.core.run_stages import WHOLE
+from driftwalk.core.progress import WHOLE
 
 # What a fit reported of the bundled recording, and when [s of a processor]; then its end.
 RECORDED = {

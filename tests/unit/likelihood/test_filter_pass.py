@@ -13,7 +13,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.difference_pairs import Pair
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
-from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import (
     FILTER,
     Series,
@@ -22,6 +22,7 @@ from driftwalk.likelihood.filter.series import (
     velocity_prior,
 )
 from driftwalk.likelihood.fit import fit_motion
+from driftwalk.likelihood.law.candidate_laws import STRENGTHS
 from driftwalk.likelihood.newton import inverse, limited, newton_step
 from driftwalk.likelihood.preparation import body_of, estimate_of, series_of
 from driftwalk.likelihood.prior import Prior, Weights

@@ -7,7 +7,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.likelihood.filter.filter_pass import Sums
-from driftwalk.likelihood.filter.parameters import DRAG_SHAPES
+from driftwalk.likelihood.law.candidate_laws import DRAG_SHAPES
 from driftwalk.likelihood.law.force_law import assumptions_of
 from driftwalk.likelihood.refuse import cholesky
 from driftwalk.likelihood.reml import pull_of_prior, remembered

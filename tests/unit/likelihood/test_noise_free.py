@@ -7,7 +7,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.likelihood.preparation import AngleUse, prepare
-from driftwalk.likelihood.tracker_errors.noise_free import with_least_noise
+from driftwalk.likelihood.recording_artifacts.noise_free import with_least_noise
 from driftwalk.record import estimate_tracking_noise
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import facts_of

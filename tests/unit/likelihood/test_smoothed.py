@@ -14,7 +14,7 @@ from scipy.signal import lfilter, savgol_filter
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.tracker_errors.smoothed import SMOOTHING, find_smoothing
+from driftwalk.likelihood.recording_artifacts.smoothed import SMOOTHING, find_smoothing
 from driftwalk.schema import Track, body_track, build_trajectory
 
 Floats = npt.NDArray[np.float64]

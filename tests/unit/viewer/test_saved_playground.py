@@ -23,7 +23,7 @@ from browser_tank import (
 import driftwalk as dw
 from driftwalk.assembly import assemble
 from driftwalk.assembly.lattice.polyomino import polyominoes
-from driftwalk.assembly.outcomes.class_names import CONTACT_POLICY, disc_class, world_class
+from driftwalk.assembly.outcomes.outcome_classes import CONTACT_POLICY, disc_class, world_class
 from driftwalk.comparison import apply_steps, ks_distance, ks_reference, plan_steps
 from driftwalk.datasets import tank30_flow, tank30_recording
 from driftwalk.schema.shapes import cells_of_shape

@@ -21,7 +21,7 @@ const PICTURE_MS = 12;
 const LONGEST_PAUSE_MS = 100;
 const DENSITY_MS = 500;
 const COUNT_MS = 100;
-/** Blocks up to which outcomes are told apart by their shapes, as `MOST_BLOCKS` in class_names.py; of more by sizes. */
+/** Blocks up to which shapes tell outcomes apart, as `MOST_BLOCKS` in outcome_classes.py; of more by sizes. */
 const MOST_LISTED = 8;
 /** Share of a time step within which an instant is that of the step's end. */
 const ROUNDING = 1e-6;

@@ -30,7 +30,7 @@ from driftwalk.assembly.control.decision_process import (
 )
 from driftwalk.assembly.control.modes import Modes
 from driftwalk.assembly.control.worlds import Rules, Wanted, Worlds, decisions_of
-from driftwalk.assembly.outcomes.class_names import outcome_classes, target_class
+from driftwalk.assembly.outcomes.outcome_classes import outcome_classes, target_class
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays

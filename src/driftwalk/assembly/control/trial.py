@@ -24,7 +24,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.intervals import difference_interval, proportion_interval
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.progress import tell_nobody
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import is_one_assembly
 from driftwalk.sweep import Store, grid, run_sweep

@@ -27,7 +27,7 @@ from driftwalk.assembly.lattice.many_blocks import (
     replay_many,
 )
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
-from driftwalk.assembly.outcomes.class_names import (
+from driftwalk.assembly.outcomes.outcome_classes import (
     class_name,
     contact_pairs,
     disc_shape,
@@ -132,7 +132,7 @@ def replay_contacts(
     pose : ndarray, shape (runs, blocks, 2 or more)
         Columns x and y at the end [m]; of rectangles the third is theta [rad].
     diameter, width
-        As in `driftwalk.assembly.outcomes.class_names.touching`.
+        As in `driftwalk.assembly.outcomes.outcome_classes.touching`.
 
     Raises
     ------

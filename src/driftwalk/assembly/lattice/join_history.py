@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import Join
 from driftwalk.assembly.lattice.polyomino import Chirality, name_of, put_beside
-from driftwalk.assembly.outcomes.class_names import class_name
+from driftwalk.assembly.outcomes.outcome_classes import class_name
 from driftwalk.schema.shapes import MOST_NAMED, Cell, counted_class, moved_to_origin
 
 

@@ -40,7 +40,7 @@ from driftwalk.assembly.outcome_posterior.region import (
 )
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS
 from driftwalk.core.arrays import Floats
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.progress import tell_nobody
 from driftwalk.core.study_keys import INFERRED_KEYS
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import texts

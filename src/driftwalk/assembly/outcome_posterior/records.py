@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from driftwalk.assembly.chains.histories import Histories, blocks_of, histories
-from driftwalk.assembly.outcomes.class_names import class_name, class_shapes, merge_chirality
+from driftwalk.assembly.outcomes.outcome_classes import class_name, class_shapes, merge_chirality
 from driftwalk.assembly.runs.dataset import DECIMALS
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import FormatError, InputError

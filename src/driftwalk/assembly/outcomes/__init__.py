@@ -1,1 +1,1 @@
-"""Outcomes of assembly: classes, distributions, distances, survival."""
+"""Outcomes of assembly: classes, distributions, distances, survival, bond kinetics."""

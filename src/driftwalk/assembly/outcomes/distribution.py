@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.outcomes.class_names import class_shapes
+from driftwalk.assembly.outcomes.outcome_classes import class_shapes
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import check_confidence, proportion_interval

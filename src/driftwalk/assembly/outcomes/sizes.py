@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
 from driftwalk.assembly.outcomes.distribution import (
     at_times,
     copied_attrs,
@@ -22,6 +21,7 @@ from driftwalk.assembly.outcomes.distribution import (
     runs_with_outcome,
     with_limits,
 )
+from driftwalk.assembly.outcomes.outcome_classes import MOST_BLOCKS
 from driftwalk.assembly.outcomes.survival import checked_times
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.intervals import check_confidence

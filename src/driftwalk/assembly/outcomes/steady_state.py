@@ -2,8 +2,6 @@
 
 Samples of one run are correlated, so that intervals come from the differences between runs, which
 are independent. Of fewer than 20 runs each is cut into batches (batch means).
-
-The rates of joining and parting of recorded classes have Poisson intervals that know of clusters.
 """
 
 from __future__ import annotations
@@ -11,9 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
+from driftwalk.assembly.outcomes.bond_kinetics import PARTS, clustering, rate_variables
 from driftwalk.assembly.outcomes.distribution import (
     class_names,
     copied_attrs,
@@ -24,10 +22,9 @@ from driftwalk.assembly.outcomes.distribution import (
 )
 from driftwalk.assembly.outcomes.survival import survival_curve
 from driftwalk.core.arrays import Bools, Floats, Integers
-from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import check_confidence, proportion_interval
 from driftwalk.schema.check import build_dataset
-from driftwalk.schema.shapes import all_single, cells_of_shape, joins_of_cells
+from driftwalk.schema.shapes import all_single
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -240,137 +237,3 @@ def _lifetimes(stays: _Stays, classes: int, confidence: float) -> tuple[Floats, 
         median[:, state] = found.median, found.median_low, found.median_high
     curves = with_limits("survival", ("age", "class"), *curve)
     return age, curves | with_limits("lifetime_median", "class", *median)
-
-
-PARTS: Final = 5
-"""Parts of a class's time that tell how events cluster; of 4, 5, 8 and 12 the number whose 90 %
-intervals held most evenly in simulated recordings of 300 to 1800 s."""
-
-
-def rate_interval(
-    count: npt.ArrayLike, time: npt.ArrayLike, *, confidence: float = 0.9
-) -> tuple[Floats, Floats]:
-    """Return the exact interval of a rate of independent events.
-
-    The interval of a Poisson mean by Garwood (Biometrika 28, 437, 1936), over the time.
-
-    Parameters
-    ----------
-    count : array_like of int
-        Events that were seen, from 0.
-    time : array_like
-        Time in which they were seen [s], from 0; broadcast against `count`.
-    confidence : float
-        Probability with which the interval holds, at least, in (0, 1).
-
-    Returns
-    -------
-    low, high : ndarray
-        Limits [1/s]; 0 and infinity where there was no time.
-
-    Raises
-    ------
-    InputError
-        When a number is negative or the confidence out of range.
-
-    Examples
-    --------
-    >>> low, high = rate_interval(0, 100.0)
-    >>> float(low), round(float(high), 5)
-    (0.0, 0.02996)
-    """
-    from scipy.special import gammaincinv
-
-    check_confidence(confidence)
-    k, span = np.broadcast_arrays(np.asarray(count, np.float64), np.asarray(time, np.float64))
-    if not ((k >= 0) & (span >= 0)).all():
-        raise InputError("a rate needs a count and a time that are not negative")
-    tail = (1.0 - confidence) / 2
-    known = span > 0
-    low = np.where(k > 0, gammaincinv(np.where(k > 0, k, 1.0), tail), 0.0)
-    high = gammaincinv(k + 1.0, 1.0 - tail)
-    unit = np.where(known, span, 1.0)
-    return np.where(known, low / unit, 0.0), np.where(known, high / unit, np.inf)
-
-
-def clustering(
-    moments: npt.ArrayLike, time: float, *, parts: int = PARTS, confidence: float = 0.9
-) -> float:
-    """Return the factor by which an interval must count fewer events because they cluster.
-
-    It is the variance of the counts in equal parts of the time over their mean, times the square
-    of Student's quantile over the normal one, as few parts do not tell it well; at least 1.
-
-    Parameters
-    ----------
-    moments : array_like
-        When each event came, in [0, time] [s].
-    time : float
-        Time in which they were seen [s].
-    parts : int
-        Number of parts, from 2.
-    confidence : float
-        As in `rate_interval`.
-
-    Examples
-    --------
-    >>> clustering([1.0, 3.0, 5.0, 7.0, 9.0], 10.0)
-    1.0
-    >>> round(clustering([1.0, 1.1, 1.2, 1.3, 9.0], 10.0), 2)
-    5.04
-    """
-    from scipy.special import ndtri, stdtrit
-
-    when = np.asarray(moments, dtype=np.float64)
-    if when.size == 0 or not time > 0:
-        return 1.0
-    counts = np.histogram(when, bins=parts, range=(0.0, time))[0]
-    ratio = float(counts.var(ddof=1) / counts.mean())
-    end = (1.0 + confidence) / 2
-    return max(1.0, float(ratio * (stdtrit(parts - 1, end) / ndtri(end)) ** 2))
-
-
-def bridges_of(name: str) -> int:
-    """Return the bonds of an outcome class of squares; 0 where loops hold blocks more than once.
-
-    Examples
-    --------
-    >>> [bridges_of(name) for name in ("1+1", "L3+2", "O+1", "12 assemblies")]
-    [0, 3, 0, 0]
-    """
-    bonds = 0
-    for cells in map(cells_of_shape, name.split("+")):
-        beside = joins_of_cells(cells)
-        if not cells or beside > len(cells) - 1:
-            return 0
-        bonds += beside
-    return bonds
-
-
-def rate_variables(
-    name: str,
-    count: npt.ArrayLike,
-    time: npt.ArrayLike,
-    *,
-    confidence: float,
-    clusters: npt.ArrayLike = 1.0,
-) -> dict[str, Any]:
-    """Return a count per class and its rate with interval, as variables of a dataset.
-
-    Parameters
-    ----------
-    name : str
-        Of the rate: ``joining`` gives ``joining_count``, ``joining_rate``, ...
-    count, time, confidence
-        As in `rate_interval`, one entry per class.
-    clusters : array_like
-        By how much events cluster: the interval is that of so many times fewer in less time.
-    """
-    number, span = np.asarray(count), np.asarray(time, dtype=np.float64)
-    fewer = 1.0 / np.asarray(clusters, dtype=np.float64)
-    low, high = rate_interval(number * fewer, span * fewer, confidence=confidence)
-    rate = np.divide(number, span, out=np.full(span.shape, np.nan), where=span > 0)
-    return {
-        f"{name}_count": ("class", number.astype(np.int64)),
-        **with_limits(f"{name}_rate", "class", rate, low, high),
-    }

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.joined_faces import ROUNDING, face_table
-from driftwalk.assembly.pull.tables import block_pull, table_of
+from driftwalk.assembly.pull.force_tables import block_pull, table_of
 from driftwalk.assembly.runs.start import (
     given_start,
     glued_cells,

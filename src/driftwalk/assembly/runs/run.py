@@ -26,7 +26,7 @@ from driftwalk.assembly.runs.start import with_event_rows
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.schema.check import kind_name
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, settings_per_unit, threads_of_unit
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.polyomino import STEPS
-from driftwalk.assembly.outcomes.class_names import overlap_depth
+from driftwalk.assembly.outcomes.outcome_classes import overlap_depth
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.class_names import listed_classes, sort_classes
 from driftwalk.assembly.outcomes.distribution import is_complete, outcome_distribution
 from driftwalk.assembly.outcomes.l1 import l1_in_floors, l1_noise_floor, pairwise_l1
+from driftwalk.assembly.outcomes.outcome_classes import listed_classes, sort_classes
 from driftwalk.assembly.runs.dataset import assembly_attrs
 from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
@@ -26,7 +26,7 @@ from driftwalk.assembly.sensitivity.settings import (
 )
 from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.core.text_files import parse_json
 from driftwalk.schema.check import build_dataset, described
 from driftwalk.schema.kinds.flow import FLOW_SERIES

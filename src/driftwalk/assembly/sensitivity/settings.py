@@ -26,7 +26,7 @@ from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, cou
 from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays, Unit, UnitT
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.simulation.series import flow_starts
 from driftwalk.sweep import (

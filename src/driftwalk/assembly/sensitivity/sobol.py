@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.class_names import listed_classes
 from driftwalk.assembly.outcomes.distribution import is_complete, sampling_variance
+from driftwalk.assembly.outcomes.outcome_classes import listed_classes
 from driftwalk.assembly.runs.plan import chirality_of
 from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
@@ -32,7 +32,7 @@ from driftwalk.assembly.sensitivity.settings import (
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import check_confidence
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.schema.check import build_dataset, described, require_kind
 from driftwalk.schema.kinds import KINDS
 from driftwalk.sweep import threads_of_unit

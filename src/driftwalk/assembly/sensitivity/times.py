@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.class_names import sort_classes
+from driftwalk.assembly.outcomes.outcome_classes import sort_classes
 from driftwalk.assembly.outcomes.survival import class_counts
 from driftwalk.assembly.runs.dataset import DECIMALS, times_of
 from driftwalk.assembly.runs.plan import Plan, whole_steps

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.assembly.outcomes.class_names import class_shapes
 from driftwalk.assembly.outcomes.distribution import at_times
+from driftwalk.assembly.outcomes.outcome_classes import class_shapes
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import Plan
 from driftwalk.assembly.sensitivity.settings import (

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.assembly.outcomes.class_names import target_class
 from driftwalk.assembly.outcomes.distribution import with_limits
+from driftwalk.assembly.outcomes.outcome_classes import target_class
 from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS, KEYS, Axes, make_axes
@@ -28,7 +28,7 @@ from driftwalk.assembly.yields.selection import (
 )
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import proportion_interval
-from driftwalk.core.run_stages import Progress, tell_nobody
+from driftwalk.core.progress import Progress, tell_nobody
 from driftwalk.schema.check import build_dataset
 from driftwalk.sweep import threads_of_unit
 

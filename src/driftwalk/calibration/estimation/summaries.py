@@ -23,7 +23,7 @@ from driftwalk.comparison import StepPlan, apply_steps
 from driftwalk.comparison.aspects import AspectPlan, WallDistance, block_of, resampled
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads, one_blas_thread
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Store, WorkUnit, run_sweep, work_units
 

@@ -39,7 +39,7 @@ from driftwalk.comparison import Statistic, StepTable
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
 

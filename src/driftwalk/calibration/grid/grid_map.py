@@ -13,8 +13,9 @@ import numpy.typing as npt
 from driftwalk.calibration.problem import Axes, Problem, Stores, in_memory, score_settings
 from driftwalk.comparison import StepTable
 from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.core.calibration_stages import MORE
 from driftwalk.core.processors import map_in_threads
-from driftwalk.core.run_stages import MORE, Progress
+from driftwalk.core.progress import Progress
 from driftwalk.motion import Details
 from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep, settings_per_unit, work_units
@@ -296,7 +297,7 @@ class SweepProgress:
 
     Examples
     --------
-    >>> from driftwalk.core.run_stages import share_of_windows
+    >>> from driftwalk.core.calibration_stages import share_of_windows
     >>> shares = []
     >>> narrowing = SweepProgress(lambda done, total: shares.append(done / total), share_of_windows)
     >>> for done in (5, 10, 5, 10):

@@ -39,8 +39,8 @@ from driftwalk.calibration.warnings import (
     step_differences,
     undetermined,
 )
+from driftwalk.core.calibration_stages import share_of_map, share_of_windows
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_stages import share_of_map, share_of_windows
 from driftwalk.motion.protocol import no_numbers
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema.answers.verdict import Verdict, verdict_of

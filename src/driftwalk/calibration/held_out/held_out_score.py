@@ -12,7 +12,7 @@ from driftwalk.calibration.held_out.recorded import CHECKS, UNITS, RecordedMotio
 from driftwalk.comparison.aspects import AspectReference
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.motion.protocol import no_numbers
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema.answers.facts import AnswerParts, texts

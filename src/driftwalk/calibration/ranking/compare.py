@@ -46,7 +46,7 @@ from driftwalk.calibration.ranking.result import build_comparison
 from driftwalk.conditions import study_in_arena
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import CancelOnError, one_blas_thread
-from driftwalk.core.run_stages import Course, tell_nobody
+from driftwalk.core.progress import Course, tell_nobody
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.sweep import MemoryStore, Store, WorkUnit, collect, grid, run_sweep, threads_of_unit
 

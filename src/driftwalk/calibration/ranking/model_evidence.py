@@ -30,7 +30,7 @@ from driftwalk.calibration.held_out.law_findings import BoutDistance, Misfit, bo
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.run_stages import Progress
+from driftwalk.core.progress import Progress
 from driftwalk.sweep import Store
 
 

@@ -33,10 +33,11 @@ from driftwalk.likelihood.check.restarts import (
     sections_of,
     within_sections,
 )
-from driftwalk.likelihood.filter.parameters import INTENSITIES, PULSES, STRENGTHS, Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series, smooth_angle, wall_intervals
 from driftwalk.likelihood.fitted_modes import flow_frames
 from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
+from driftwalk.likelihood.law.candidate_laws import INTENSITIES, PULSES, STRENGTHS
 from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.spline import Spline
 from driftwalk.schema.answers.facts import fitted_value

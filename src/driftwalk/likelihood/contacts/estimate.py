@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.conditions import estimated_study
 from driftwalk.core.arrays import Floats
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.progress import tell_nobody
 from driftwalk.likelihood.contacts.particles import (
     Part,
     Passages,

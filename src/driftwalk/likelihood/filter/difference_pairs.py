@@ -10,7 +10,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats
-from driftwalk.likelihood.filter.parameters import NUMBERS, Point
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.law.candidate_laws import NUMBERS
 
 
 def unpacked(lower: Floats) -> Floats:

@@ -30,13 +30,7 @@ from driftwalk.likelihood.filter.difference_pairs import (
     noise_derivatives,
     used_of,
 )
-from driftwalk.likelihood.filter.parameters import (
-    INTENSITIES,
-    OF_PREDICTIONS,
-    STRENGTHS,
-    Body,
-    Point,
-)
+from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.filter.series import (
     FILTER,
     Series,
@@ -44,6 +38,7 @@ from driftwalk.likelihood.filter.series import (
     layer_strengths,
     slow_change,
 )
+from driftwalk.likelihood.law.candidate_laws import INTENSITIES, OF_PREDICTIONS, STRENGTHS
 from driftwalk.likelihood.spline import Spline
 
 Place = tuple[slice, slice]

@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Floats, remembered
 from driftwalk.flow.arena import Outline, outline_of
-from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.law.candidate_laws import STRENGTHS
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

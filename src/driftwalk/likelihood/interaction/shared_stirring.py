@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Floats
-from driftwalk.core.run_stages import Course
+from driftwalk.core.progress import Course
 from driftwalk.core.units import in_percent
 from driftwalk.likelihood.filter.difference_pairs import unpacked
 from driftwalk.likelihood.filter.filter_pass import Passes

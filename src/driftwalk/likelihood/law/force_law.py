@@ -11,14 +11,13 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.filter.parameters import (
+from driftwalk.likelihood.filter.parameters import Point, body_of
+from driftwalk.likelihood.law.candidate_laws import (
     CHANGES,
     DRAG_SHAPES,
     DRAGS,
     INTENSITIES,
     STRENGTHS,
-    Point,
-    body_of,
 )
 from driftwalk.likelihood.newton import Mode, ModeSearch, inverse
 from driftwalk.likelihood.refuse import BREAKDOWN

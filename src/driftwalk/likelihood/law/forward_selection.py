@@ -13,14 +13,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter.parameters import (
-    CHANGES,
-    DRAG_SHAPES,
-    NUMBERS,
-    PULSES,
-    STRENGTHS,
-    Point,
-)
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.law.candidate_laws import CHANGES, DRAG_SHAPES, NUMBERS, PULSES, STRENGTHS
 from driftwalk.likelihood.law.force_law import FLOATING, Assumptions
 from driftwalk.likelihood.law.score_tests import (
     Pulses,

@@ -11,10 +11,11 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.run_stages import Course, tell_nobody
+from driftwalk.core.progress import Course, tell_nobody
 from driftwalk.likelihood.filter.filter_pass import log_densities
-from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, DRAGS, Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.law.candidate_laws import DRAG_SHAPES, DRAGS
 from driftwalk.likelihood.law.force_law import FLOATING
 from driftwalk.likelihood.law.search import evidence_of
 from driftwalk.likelihood.newton import ModeSearch, Passed, Tell

@@ -16,9 +16,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.units import in_percent
-from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, DRAGS, NUMBERS, Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
-from driftwalk.likelihood.law.alternatives import LAW_NUMBERS, Alternatives, number_sentence
+from driftwalk.likelihood.law.candidate_laws import DRAG_SHAPES, DRAGS, NUMBERS
+from driftwalk.likelihood.law.confounders import LAW_NUMBERS, Confounders, number_sentence
 from driftwalk.likelihood.law.force_law import FLOATING, Assumptions
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult, is_retained
 from driftwalk.likelihood.law.score_tests import ScoreTests, score_tests
@@ -99,7 +100,7 @@ class LawSearch:
         """Keep the search, and what makes the series without contacts and mistakes."""
         self.assumptions, self.search = assumptions, search
         self.selection = ForwardSelection(search, assumptions)
-        self.alternatives = Alternatives(search, self.selection, undisturbed)
+        self.confounders = Confounders(search, self.selection, undisturbed)
 
     def find(self, starts: Starts, weights: Weights) -> LawResult:
         """Return the law and the mode that the recording supports."""
@@ -308,7 +309,7 @@ class LawSearch:
         """Return the law without the numbers that other explanations account for."""
         mode, known = found.mode, self.assumptions.opened
         names = [name for name in LAW_NUMBERS if name in mode.point.opened and name not in known]
-        objections = self.alternatives.objections(mode, names) if names else {}
+        objections = self.confounders.objections(mode, names) if names else {}
         if not objections:
             return found
         closed = self.selection.without(mode, set(objections)) or found.base

@@ -16,8 +16,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats, Integers
-from driftwalk.likelihood.filter.parameters import STRENGTHS
 from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.law.candidate_laws import STRENGTHS
 from driftwalk.likelihood.law.score_tests import Scores, ScoreTests
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import face_table
-from driftwalk.assembly.outcomes.class_names import CONTACT_POLICY
-from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.outcomes.outcome_classes import CONTACT_POLICY
+from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.assembly.runs.plan import Plan, make_plan, whole_steps
 from driftwalk.comparison.significance import steps_memory_time, usual_block_length
 from driftwalk.core.errors import InputError

@@ -18,7 +18,7 @@ from driftwalk.assembly import (
     sort_classes,
     world_class,
 )
-from driftwalk.assembly.outcomes.class_names import disc_class
+from driftwalk.assembly.outcomes.outcome_classes import disc_class
 from driftwalk.assembly.sensitivity.times import (
     Courses,
     added,

@@ -11,9 +11,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.calibration_stages import (
+    CALIBRATION_STAGES,
+    MORE,
+    share_of_map,
+    share_of_windows,
+)
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.files.run_layout import run_file
-from driftwalk.core.run_stages import CALIBRATION_STAGES, MORE, share_of_map, share_of_windows
 from driftwalk.page import encode_array
 from driftwalk.page.sections.calibration import bootstrap_section, one_body, profile_sections
 from driftwalk.page.sections.map import map_section

@@ -10,8 +10,8 @@ from typing import Any, Final
 from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
 from driftwalk.core.files.shards import read_specification
+from driftwalk.core.progress import tell_nobody
 from driftwalk.core.provenance import read_manifest, refuse_other_version
-from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.text_files import path_inside, text_of_name
 from driftwalk.page.html import page_frame
 from driftwalk.page.parts import empty_section

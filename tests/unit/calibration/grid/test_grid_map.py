@@ -13,9 +13,9 @@ from driftwalk.calibration.grid.grid_map import MapSimulator, SweepProgress
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.comparison import apply_steps
 from driftwalk.conditions import recorded_camera
+from driftwalk.core.calibration_stages import share_of_map
 from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import world_keys
-from driftwalk.core.run_stages import share_of_map
 from driftwalk.schema import Track, body_track
 from driftwalk.simulation import Start
 from driftwalk.simulation.backend import Camera

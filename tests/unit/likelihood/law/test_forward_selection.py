@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fit_worlds import coarse_study, driven
 
-from driftwalk.likelihood.filter.parameters import STRENGTHS
+from driftwalk.likelihood.law.candidate_laws import STRENGTHS
 from driftwalk.likelihood.law.force_law import FLOATING, assumptions_of
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult, _parts
 from driftwalk.likelihood.law.score_tests import ScoreTests

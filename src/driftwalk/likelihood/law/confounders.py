@@ -1,4 +1,4 @@
-"""Alternatives to an opened law: what else feigns a power of the drag or a memory of the force.
+"""Confounders of an opened law: what else feigns a power of the drag or a memory of the force.
 
 Contacts with the wall that the filter takes for free motion, mistakes of the tracker and a flow
 whose shape changes leave errors that another law absorbs. Such a law is opened only where the
@@ -25,22 +25,22 @@ LAW_NUMBERS: Final[Mapping[str, tuple[str, str]]] = {
 """Numbers of the law, in words, with their units."""
 
 
-class AlternativesPolicy(NamedTuple):
-    """When an alternative explains what a number of the law was opened for."""
+class ConfounderPolicy(NamedTuple):
+    """When a confounder explains what a number of the law was opened for."""
 
     least_disturbed: float = 0.02
-    """Share of the intervals near the wall or next to a gap from which on they are tried as an
-    alternative. Chosen by hand."""
+    """Share of the intervals near the wall or next to a gap from which on they are tried as a
+    confounder. Chosen by hand."""
     same_sigmas: float = 3.0
     """Standard deviations within which the number is the same without them: half of its least
     effect counts as an error of the filter. Chosen by hand, as the retained sigmas."""
 
 
-ALTERNATIVE: Final = AlternativesPolicy()
+CONFOUNDER: Final = ConfounderPolicy()
 
 
-class Alternatives:
-    """Tries alternatives for the recordings of one fit."""
+class Confounders:
+    """Tries the confounders in the recordings of one fit."""
 
     def __init__(
         self,
@@ -60,14 +60,14 @@ class Alternatives:
         return find_shape_change(passes.series, self.scores.at(mode), side=passes.body.side)
 
     def objections(self, mode: Mode, names: Sequence[str]) -> dict[str, str]:
-        """Return for each number of the law that an alternative explains why, in a sentence."""
+        """Return for each number of the law that a confounder explains why, in a sentence."""
         shape = self.shape_change(mode)
         if shape is not None and shape.significant:
             why = "the shape of the flow changes, which feigns such a law"
             return {name: f"{number_sentence(mode, name)} was not opened: {why}" for name in names}
         series, usable = self.undisturbed(), usable_intervals(self.search.passes.series)
         share = usable_intervals(series) / max(usable, 1)
-        if share > 1.0 - ALTERNATIVE.least_disturbed:
+        if share > 1.0 - CONFOUNDER.least_disturbed:
             return {}
         alone = self.search.of(series).shortened().find(mode.point, mode.weights, held=FROM_ANOTHER)
         return {
@@ -83,7 +83,7 @@ class Alternatives:
     def _same(self, mode: Mode, alone: Mode, name: str) -> bool:
         (value, _), (other, std) = mode.value_of(name), alone.value_of(name)
         error = math.hypot(std, 0.5 * self.least.get(name, 0.0))
-        same = abs(value - other) <= ALTERNATIVE.same_sigmas * error
+        same = abs(value - other) <= CONFOUNDER.same_sigmas * error
         return same and is_retained(alone, name, self.least)
 
     def _without(self, alone: Mode | None, name: str, share: float) -> str:

@@ -14,7 +14,7 @@ from hypothesis import given, settings, strategies as st
 
 import driftwalk as dw
 from driftwalk.likelihood.interval_inflation import with_mended_frames
-from driftwalk.likelihood.tracker_errors.dropped import (
+from driftwalk.likelihood.recording_artifacts.dropped_frames import (
     DROPPED,
     _axes,
     find_dropped_frames,

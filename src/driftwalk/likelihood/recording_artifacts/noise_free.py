@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from driftwalk.schema import Track
-from driftwalk.schema.tracker_errors import estimate_tracking_noise
+from driftwalk.schema.tracking_noise import estimate_tracking_noise
 
 
 class LeastNoisePolicy(NamedTuple):

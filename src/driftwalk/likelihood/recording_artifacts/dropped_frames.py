@@ -28,7 +28,7 @@ import numpy.typing as npt
 from driftwalk.core.arrays import Floats, Integers, remembered
 from driftwalk.likelihood.filter.series import ORIENTED_SHARE
 from driftwalk.schema import Track
-from driftwalk.schema.tracker_errors import estimate_tracking_noise
+from driftwalk.schema.tracking_noise import estimate_tracking_noise
 
 WIDTH: Final = 8
 """Samples of a window, four on either side of the interval in question."""

@@ -23,13 +23,13 @@ from driftwalk.assembly.chains.hidden import (
 )
 from driftwalk.assembly.chains.histories import Histories, blocks_of, datasets_of, histories
 from driftwalk.assembly.chains.mixing import WELL_MIXED, equal_rates, judge_mixing, needed_events
-from driftwalk.assembly.outcomes.class_names import sort_classes
+from driftwalk.assembly.outcomes.bond_kinetics import PARTS, clustering, rate_interval
 from driftwalk.assembly.outcomes.distribution import with_limits
-from driftwalk.assembly.outcomes.steady_state import PARTS, clustering, rate_interval
+from driftwalk.assembly.outcomes.outcome_classes import sort_classes
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.progress import tell_nobody
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import is_one_assembly

@@ -15,12 +15,7 @@ import driftwalk as dw
 from driftwalk.likelihood.preparation import prepare
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import facts_of
-from driftwalk.schema.tracker_errors import (
-    OUTLIER,
-    outliers_in,
-    without_far_outliers,
-    without_outliers,
-)
+from driftwalk.schema.outliers import OUTLIER, outliers_in, without_far_outliers, without_outliers
 
 SECONDS = 300.0
 NOISE_M = 3e-4

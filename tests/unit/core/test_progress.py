@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from driftwalk.core.run_stages import WHOLE, Course, share_of_search
+from driftwalk.core.progress import WHOLE, Course, share_of_search
 
 
 def test_stages_that_begin_again_do_not_take_the_whole_back() -> None:

@@ -12,7 +12,7 @@ from fit_worlds import coarse_study, recording
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood import fit as fitting
 from driftwalk.likelihood.filter.series import Series
-from driftwalk.likelihood.law.alternatives import Alternatives
+from driftwalk.likelihood.law.confounders import Confounders
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, least_effects
 from driftwalk.likelihood.newton import Mode, ModeSearch
 from driftwalk.likelihood.preparation import PreparedRecordings, prepare
@@ -41,7 +41,7 @@ def objection(alone: Mode | None, *, left_out: float = 0.6, flows: int = 2) -> s
         return alone
 
     selection = SimpleNamespace(least=least_effects(0.03), scores=None)
-    tried = Alternatives(
+    tried = Confounders(
         cast(ModeSearch, search), cast(ForwardSelection, selection), lambda: [series(left_out)]
     )
     return tried.objections(mode((2.47, 0.02)), ["drag_power"]).get("drag_power", "")

@@ -1,1 +1,0 @@
-"""Mistakes of the camera and its tracker, as the track itself shows them."""
