@@ -628,7 +628,7 @@ def _pinned(
 
 
 POLE_COLORS: Final = {1: "#C1121F", -1: "#FFFFFF"}
-"""Of the bars along magnetic faces: N red, S white; no colour of an assembly."""
+"""Bars along magnetic faces are red for N and white for S, which no assembly is."""
 
 
 class PoleBarPolicy(NamedTuple):
