@@ -102,6 +102,76 @@ void check_flat_face() {
   }
 }
 
+// A rectangle with either side flat on the wall, and a disc, bounce straight back without spin.
+void check_other_bodies() {
+  const auto own_axes = [](double theta) { return driftwalk::axes_at(theta); };
+  const auto bounce = [&](const auto& body, const WallView<double>& wall, Pose<double>& pose,
+                          Motion<double>& motion) {
+    CHECK(driftwalk::meet_wall(wall, body, 600.0, driftwalk::NoArm{}, own_axes, pose, motion));
+  };
+  const driftwalk::Box<double> box{0.02, 0.01, std::hypot(0.02, 0.01)};
+  for (int turns = 0; turns < 4; ++turns) {
+    const double ahead = turns % 2 == 0 ? box.half_length : box.half_width;
+    Pose<double> pose{0.1 - ahead + 1e-4, 0.03, turns * pi / 2};
+    Motion<double> motion{0.05, 0.01, 0};
+    bounce(box, straight(0.5, 0), pose, motion);
+    CHECK_NEAR(motion.vx, -0.025, 1e-15);
+    CHECK_NEAR(motion.vy, 0.01, 1e-15);
+    CHECK_NEAR(motion.omega, 0.0, 1e-12);
+    CHECK_NEAR(pose.x, 0.1 - ahead, 1e-15);
+  }
+  const driftwalk::Disc<double> disc{0.012};
+  for (const double heading : {0.0, 0.7, 2.5, -2.0}) {
+    const double c = std::cos(heading), s = std::sin(heading), reach = 0.15 - disc.radius + 1e-4;
+    Pose<double> pose{reach * c, reach * s, 0.4};
+    Motion<double> motion{0.05 * c, 0.05 * s, 0};
+    bounce(disc, circle(0.5, 0), pose, motion);
+    CHECK_NEAR(motion.vx, -0.025 * c, 1e-15);
+    CHECK_NEAR(motion.vy, -0.025 * s, 1e-15);
+    CHECK_NEAR(motion.omega, 0.0, 1e-12);
+    CHECK_NEAR(std::hypot(pose.x, pose.y), 0.15 - disc.radius, 1e-15);
+  }
+}
+
+// Two corners that hit at once, without bounce or friction: the pushes are the one pair for which
+// each is zero or stops its corner, none pulls, and no corner goes on closing.
+void check_two_corners() {
+  synthetic::Uniform draw;
+  int alone = 0, both = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const double theta = 0.75 * draw(), c = std::cos(theta), s = std::sin(theta);
+    Pose<double> pose{0.1 - half * (c - std::fabs(s)) + 1e-3, 0, theta}; // both corners outside
+    Motion<double> motion{0.05 + 0.05 * draw(), 0.05 * draw(), 6 * draw()};
+    const double arm[2] = {half * (s + c), half * (s - c)}; // y of the corners at the wall
+    const double closing[2] = {motion.vx - motion.omega * arm[0],
+                               motion.vx - motion.omega * arm[1]};
+    if (closing[0] <= 0 || closing[1] <= 0) {
+      continue;
+    }
+    const double own[2] = {1 + arm[0] * arm[0] * per_inertia, 1 + arm[1] * arm[1] * per_inertia};
+    const double cross = 1 + arm[0] * arm[1] * per_inertia;
+    const double scale = 1 / (own[0] * own[1] - cross * cross);
+    double push[2] = {(own[1] * closing[0] - cross * closing[1]) * scale,
+                      (own[0] * closing[1] - cross * closing[0]) * scale};
+    const bool pulls = push[0] < 0 || push[1] < 0;
+    for (int corner = 0; pulls && corner < 2; ++corner) {
+      const double one = closing[corner] / own[corner];
+      if (closing[1 - corner] - cross * one <= 0) {
+        push[corner] = one;
+        push[1 - corner] = 0;
+      }
+    }
+    (pulls ? alone : both) += 1;
+    const Motion<double> before = motion;
+    driftwalk::meet_wall(straight(0, 0), half, per_inertia, pose, motion);
+    CHECK_NEAR(motion.vx, before.vx - push[0] - push[1], 1e-13);
+    CHECK_NEAR(motion.vy, before.vy, 1e-15);
+    const double turn = (arm[0] * push[0] + arm[1] * push[1]) * per_inertia;
+    CHECK_NEAR(motion.omega, before.omega + turn, 1e-10);
+  }
+  CHECK(alone > 300 && both > 300);
+}
+
 // Friction takes at most mu times the normal momentum, and never more than what stops the corner.
 void check_friction() {
   for (const double friction : {0.0, 0.1, 0.5, 2.0}) {
@@ -187,6 +257,8 @@ void check_random_impacts(const WallView<double>& shape, const char* name, doubl
 int main() {
   check_single_corner();
   check_flat_face();
+  check_other_bodies();
+  check_two_corners();
   check_friction();
   check_random_impacts(circle(0, 0), "circle", 0.01, 1e-15);
   const auto view = [](const std::vector<PreparedEdge<double>>& edges) {
