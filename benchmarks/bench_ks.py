@@ -7,8 +7,9 @@ out; medians of processor time:
 
 * "unsorted": both samples as they come; "prepared": the first one prepared (`ks_reference`), as a
   calibration does with the recording; both again on every instruction set that this processor has;
-* a line below: "pixels", steps between positions on a pixel grid, where lengths and angles repeat,
-  and "grid", samples rounded to some 70 values an axis, in turn with the samples without ties;
+* two lines below: "pixels", steps between positions on a pixel grid, where lengths and angles
+  repeat, and "grid", samples rounded to some 70 values an axis, in turn with the samples without
+  ties; with all tied points counted, and as `ks_distance`, which needs to know of a twentieth only;
 * "ns a point": the unsorted time over the 2 n points of both samples;
 * "merging": an O(n log^2 n) merge of prefix sums, vectorised in NumPy; once;
 * "loop": one origin at a time with boolean masks, O(n^2), as the usual pure-Python packages do. It
@@ -25,6 +26,7 @@ import os
 import statistics
 import sys
 import time
+import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -32,7 +34,14 @@ import numpy.typing as npt
 from timing import interleaved, machine
 
 from driftwalk import _core
-from driftwalk.comparison import KsComparison, block_permutation_test, ks_compare, ks_reference
+from driftwalk.comparison import (
+    ComparisonWarning,
+    KsComparison,
+    block_permutation_test,
+    ks_compare,
+    ks_distance,
+    ks_reference,
+)
 
 Points = npt.NDArray[np.float64]
 LOOP_CELLS = 40_000_000
@@ -185,6 +194,7 @@ def bench(n: int, rounds: int) -> None:
             f"{loop_ms / ours_ms:>9.0f}"
         )
     tied_ways: dict[str, Callable[[], object]] = {}
+    distances: dict[str, Callable[[], object]] = {}
     for kind, (first, second) in (("pixels", pixel_samples(n)), ("grid", grid_samples(n))):
         prepared = ks_reference(first)
         check_tied(f"{n} {kind}", first, second)
@@ -194,10 +204,13 @@ def bench(n: int, rounds: int) -> None:
         tied_ways[f"{kind}, prepared"] = lambda prepared=prepared, second=second: (
             prepared.native.compare(second, False)
         )
+        distances[kind] = lambda first=first, second=second: ks_distance(first, second)
     tied_ways["no ties"] = lambda: _core.ks_compare(a, b, False)
     tied_ways["no ties, prepared"] = lambda: reference.native.compare(b, False)
-    tied = median_ms(tied_ways, rounds)
-    print(f"{'':>7} " + ", ".join(f"{name} {ms:.3f}" for name, ms in tied.items()), flush=True)
+    distances["no ties"] = lambda: ks_distance(a, b)
+    for title, some in (("compared", tied_ways), ("distance", distances)):
+        line = ", ".join(f"{name} {ms:.3f}" for name, ms in median_ms(some, rounds).items())
+        print(f"{'':>7} {title}: {line}", flush=True)
     if n > OTHERS_UP_TO:
         return
     others = median_ms(
@@ -226,6 +239,7 @@ def main() -> None:
     )
     parser.add_argument("--rounds", type=int, default=9)
     options = parser.parse_args()
+    warnings.simplefilter("ignore", ComparisonWarning)
     print(machine())
     print("Medians in ms of processor time; ratios to ours unsorted. Both samples have n points.")
     print(

@@ -68,23 +68,25 @@ Result result_of(const KsResult& r) {
   return {r.d1, r.d2, r.n1, r.n2, r.tied, place_of(r.place1), place_of(r.place2)};
 }
 
-Result compare(const KsReference& reference, const Points& points, bool limits) {
+Result compare(const KsReference& reference, const Points& points, bool limits,
+               std::int64_t most_tied) {
   const nb::gil_scoped_release released;
   Scratch& own = scratch();
   own.columns.assign(points);
   return result_of(ks_two_sample(reference, own.columns.x.data(), own.columns.y.data(),
                                  own.columns.size(), own.workspace,
-                                 limits ? KsTies::limits : KsTies::strict));
+                                 limits ? KsTies::limits : KsTies::strict, most_tied));
 }
 
-Result compare_once(const Points& a, const Points& b, bool limits) {
+Result compare_once(const Points& a, const Points& b, bool limits, std::int64_t most_tied) {
   const nb::gil_scoped_release released;
   Scratch& own = scratch();
   own.first.assign(a);
   own.columns.assign(b);
   return result_of(ks_two_sample(own.first.x.data(), own.first.y.data(), own.first.size(),
                                  own.columns.x.data(), own.columns.y.data(), own.columns.size(),
-                                 own.workspace, limits ? KsTies::limits : KsTies::strict));
+                                 own.workspace, limits ? KsTies::limits : KsTies::strict,
+                                 most_tied));
 }
 
 // (D n1 n2, points that tie, place)
@@ -127,8 +129,8 @@ void register_ks(nb::module_& module) {
           },
           "points"_a)
       .def_prop_ro("size", &KsReference::size)
-      .def("compare", &compare, "points"_a, "limits"_a)
+      .def("compare", &compare, "points"_a, "limits"_a, "most_tied"_a = ks_every_tie)
       .def("peacock", &peacock, "points"_a);
-  module.def("ks_compare", &compare_once, "a"_a, "b"_a, "limits"_a);
+  module.def("ks_compare", &compare_once, "a"_a, "b"_a, "limits"_a, "most_tied"_a = ks_every_tie);
   module.def("ks_permutations", &permute, "pooled"_a, "n1"_a, "block_of"_a, "labels"_a, "limits"_a);
 }

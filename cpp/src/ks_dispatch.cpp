@@ -170,7 +170,7 @@ KsResult compare_sorted(const KsReference::Data& first, const KsSortedSample& se
 // The same of two samples as they come; false where it has to be found by the sorted way.
 bool compare_plain(const double* x1, const double* y1, std::int64_t n1, const double* x2,
                    const double* y2, std::int64_t n2, KsWorkspace::Data& work, KsTies ties,
-                   KsResult& result, bool counts_tied = true) {
+                   KsResult& result, std::int64_t most_tied = ks_every_tie) {
   if (ties != KsTies::strict || n1 + n2 < ks_bounded_from || n1 + n2 > ks_bounded_to) {
     return false;
   }
@@ -178,7 +178,7 @@ bool compare_plain(const double* x1, const double* y1, std::int64_t n1, const do
   const KsPlain samples{{x1, x2},           {y1, y2},
                         {n1, n2},           {n2 / common, -(n1 / common)},
                         n1 * (n2 / common), ks_bucket_sizes(n1 + n2),
-                        counts_tied,        work.aligned_scratch(ks_bounded_bytes(n1 + n2))};
+                        most_tied,          work.aligned_scratch(ks_bounded_bytes(n1 + n2))};
   KsFound found[2];
   result.n1 = n1;
   result.n2 = n2;
@@ -206,7 +206,8 @@ KsResult without_points(std::int64_t n1, std::int64_t n2) {
 } // namespace
 
 KsResult ks_two_sample(const KsReference& reference, const double* x2, const double* y2,
-                       std::int64_t n2, KsWorkspace& workspace, KsTies ties, bool counts_tied) {
+                       std::int64_t n2, KsWorkspace& workspace, KsTies ties,
+                       std::int64_t most_tied) {
   if (reference.size() == 0 || n2 == 0) {
     return without_points(reference.size(), n2);
   }
@@ -214,7 +215,7 @@ KsResult ks_two_sample(const KsReference& reference, const double* x2, const dou
   const KsReference::Data& first = reference.data();
   KsResult result;
   if (compare_plain(first.x.data(), first.y.data(), first.sorted.n, x2, y2, n2, work, ties, result,
-                    counts_tied)) {
+                    most_tied)) {
     return result;
   }
   ks_sort(x2, y2, n2, work.sort, work.sorted);
@@ -240,13 +241,14 @@ KsResult ks_two_sample(const KsReference& first, const KsReference& second, KsWo
 }
 
 KsResult ks_two_sample(const double* x1, const double* y1, std::int64_t n1, const double* x2,
-                       const double* y2, std::int64_t n2, KsWorkspace& workspace, KsTies ties) {
+                       const double* y2, std::int64_t n2, KsWorkspace& workspace, KsTies ties,
+                       std::int64_t most_tied) {
   if (n1 == 0 || n2 == 0) {
     return without_points(n1, n2);
   }
   KsWorkspace::Data& work = workspace.data();
   KsResult result;
-  if (compare_plain(x1, y1, n1, x2, y2, n2, work, ties, result)) {
+  if (compare_plain(x1, y1, n1, x2, y2, n2, work, ties, result, most_tied)) {
     return result;
   }
   work.first.assign(x1, y1, n1, workspace);
@@ -259,7 +261,7 @@ std::optional<KsResult> ks_by_bounds(const double* x1, const double* y1, std::in
                                      KsWorkspace& workspace) {
   KsResult result;
   if (n1 == 0 || n2 == 0 ||
-      !compare_plain(x1, y1, n1, x2, y2, n2, workspace.data(), KsTies::strict, result, false)) {
+      !compare_plain(x1, y1, n1, x2, y2, n2, workspace.data(), KsTies::strict, result, 0)) {
     return std::nullopt;
   }
   return result;

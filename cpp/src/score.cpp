@@ -79,7 +79,7 @@ private:
     double distance = 1;
     if (pairs > 0 && out_.status[world] == status_ok) {
       const KsResult result = ks_two_sample(*scoring_.reference, length_.data(), angle_.data(),
-                                            pairs, workspace_, KsTies::strict, false);
+                                            pairs, workspace_, KsTies::strict, 0);
       distance = result.distance();
       place = result.place();
     }

@@ -20,6 +20,10 @@ void check_pair(const Sample& a, const Sample& b, KsTies ties, KsWorkspace& work
   const KsResult plain = ks_two_sample(a.x.data(), a.y.data(), a.size(), b.x.data(), b.y.data(),
                                        b.size(), workspace, ties);
   CHECK(plain.d1 == expected.d1 && plain.d2 == expected.d2 && plain.tied == r.tied);
+  const std::int64_t half = r.tied / 2;
+  const KsResult part = ks_two_sample(a.x.data(), a.y.data(), a.size(), b.x.data(), b.y.data(),
+                                      b.size(), workspace, ties, half);
+  CHECK(part.d1 == expected.d1 && part.tied <= r.tied && (part.tied > half) == (r.tied > half));
   const KsResult prepared = ks_two_sample(first, second, workspace, ties);
   CHECK(prepared.d1 == expected.d1 && prepared.d2 == expected.d2);
 }

@@ -16,7 +16,7 @@ constant column. Angles are cut at +-pi: D depends on the cut, so it is fixed.
 from __future__ import annotations
 
 import warnings
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -110,7 +110,7 @@ class KsReference:
         method: Method = "fasano-franceschini",
     ) -> float:
         """Return the distance to another sample, as `ks_distance` does."""
-        return self._compare(other, ties, combine, method).distance
+        return self._compare(other, ties, combine, method, counts_ties=False).distance
 
     def compare(
         self,
@@ -124,13 +124,21 @@ class KsReference:
         return self._compare(other, ties, combine, method)
 
     def _compare(
-        self, other: npt.ArrayLike, ties: Ties, combine: Combine, method: Method
+        self,
+        other: npt.ArrayLike,
+        ties: Ties,
+        combine: Combine,
+        method: Method,
+        *,
+        counts_ties: bool = True,
     ) -> KsComparison:
         points = checked_points(other, "other")
         _check_options(ties, combine, method)
         if method == "peacock":
             return _peacock(self.native, points)
-        return _comparison(self.native.compare(points, ties == "limits"), ties, combine)
+        most = _most_tied(len(self) + len(points), ties, counts_ties)
+        found = self.native.compare(points, ties == "limits", *most)
+        return _comparison(found, ties, combine, counts_ties)
 
 
 def ks_reference(sample: npt.ArrayLike) -> KsReference:
@@ -205,7 +213,7 @@ def ks_distance(
     >>> ks_distance([[0, 0], [1, 1], [2, 2]], [[10, 10], [11, 11]])
     1.0
     """
-    return _compare_once(a, b, ties, combine, method).distance
+    return _compare_once(a, b, ties, combine, method, counts_ties=False).distance
 
 
 def ks_compare(
@@ -234,13 +242,32 @@ def ks_compare(
 
 
 def _compare_once(
-    a: npt.ArrayLike, b: npt.ArrayLike, ties: Ties, combine: Combine, method: Method
+    a: npt.ArrayLike,
+    b: npt.ArrayLike,
+    ties: Ties,
+    combine: Combine,
+    method: Method,
+    *,
+    counts_ties: bool = True,
 ) -> KsComparison:
     first, second = checked_points(a, "a"), checked_points(b, "b")
     _check_options(ties, combine, method)
     if method == "peacock":
         return _peacock(_core.KsReference(first), second)
-    return _comparison(_core.ks_compare(first, second, ties == "limits"), ties, combine)
+    most = _most_tied(len(first) + len(second), ties, counts_ties)
+    found = _core.ks_compare(first, second, ties == "limits", *most)
+    return _comparison(found, ties, combine, counts_ties)
+
+
+MANY_TIED: Final = 20
+"""One point in so many may be tied before a warning: 5 %, chosen by hand."""
+
+
+def _most_tied(points: int, ties: Ties, counts: bool) -> tuple[int, ...]:
+    """Return how many tied points to count: of a distance alone those that decide on a warning."""
+    if counts:
+        return ()
+    return (points // MANY_TIED if ties == "strict" else 0,)
 
 
 def checked_points(points: npt.ArrayLike, name: str) -> Points:
@@ -267,13 +294,16 @@ def _place(place: tuple[float, float, int, int]) -> KsPlace:
     return KsPlace(x, y, quadrant, row) if quadrant >= 0 else KsPlace(np.nan, np.nan, -1, -1)
 
 
-def _comparison(raw: _core.KsResult, ties: Ties, combine: Combine) -> KsComparison:
+def _comparison(
+    raw: _core.KsResult, ties: Ties, combine: Combine, counts_ties: bool
+) -> KsComparison:
     d1, d2, n1, n2, tied, place1, place2 = raw
     product = n1 * n2
     tied_fraction = tied / (n1 + n2)
-    if ties == "strict" and tied_fraction > 0.05:
+    if ties == "strict" and tied * MANY_TIED > n1 + n2:
+        share = f"{100 * tied_fraction:.0f}" if counts_ties else f"more than {100 // MANY_TIED}"
         warnings.warn(
-            f"{100 * tied_fraction:.0f} % of the points share a coordinate with another point, "
+            f"{share} % of the points share a coordinate with another point, "
             'and open quadrants leave such points out: consider ties="limits"',
             ComparisonWarning,
             stacklevel=4,  # the caller of the public function

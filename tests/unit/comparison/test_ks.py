@@ -63,16 +63,28 @@ def test_more_than_a_twentieth_of_ties_warns() -> None:
     assert ks_compare(a, b).tied_fraction == pytest.approx(0.045)
     b[:60, 0] = a[:60, 0]
     reference = ks_reference(a)
-    for call in (
-        lambda: ks_distance(a, b),
-        lambda: ks_compare(a, b),
-        lambda: reference.distance(b),
-        lambda: reference.compare(b),
+    for share, call in (
+        ("more than 5 %", lambda: ks_distance(a, b)),
+        ("6 %", lambda: ks_compare(a, b)),
+        ("more than 5 %", lambda: reference.distance(b)),
+        ("6 %", lambda: reference.compare(b)),
     ):
-        with pytest.warns(ComparisonWarning, match="6 % of the points share a") as caught:
+        with pytest.warns(ComparisonWarning, match=f"^{share} of the points share a") as caught:
             call()
         assert caught[0].filename == __file__
     assert ks_compare(a, b, ties="limits").tied_fraction == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.filterwarnings("error")
+def test_a_distance_warns_from_the_first_point_beyond_a_twentieth(axis: int) -> None:
+    rng = np.random.default_rng(2)
+    a, b = rng.normal(size=(1000, 2)), rng.normal(size=(1000, 2))
+    b[:50, axis] = a[:50, axis]
+    ks_distance(a, b)
+    b[50, axis] = b[0, axis]
+    with pytest.warns(ComparisonWarning, match="more than 5 %"):
+        ks_distance(a, b)
 
 
 def test_a_reference_travels_to_another_process() -> None:

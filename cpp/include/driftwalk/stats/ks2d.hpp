@@ -11,6 +11,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -85,11 +86,14 @@ private:
   std::unique_ptr<Data> data_;
 };
 
-// The statistic between the reference (sample 1) and the points (x2, y2) (sample 2). Who does not
-// need the number of tied points saves up to a quarter of the time; it may be 0 then.
+// Who needs to know only whether more than so many points are tied spares the count of the rest.
+constexpr std::int64_t ks_every_tie = std::numeric_limits<std::int64_t>::max();
+
+// The statistic between the reference (sample 1) and the points (x2, y2) (sample 2). The number of
+// tied points is right up to `most_tied`; beyond it is at least one more. With 0 it may be 0.
 KsResult ks_two_sample(const KsReference& reference, const double* x2, const double* y2,
                        std::int64_t n2, KsWorkspace& workspace, KsTies ties = KsTies::strict,
-                       bool counts_tied = true);
+                       std::int64_t most_tied = ks_every_tie);
 
 // The same where both samples are prepared: a sample that is met many times is sorted once.
 KsResult ks_two_sample(const KsReference& first, const KsReference& second, KsWorkspace& workspace,
@@ -98,7 +102,7 @@ KsResult ks_two_sample(const KsReference& first, const KsReference& second, KsWo
 // The same where neither is: nothing is sorted in most cases.
 KsResult ks_two_sample(const double* x1, const double* y1, std::int64_t n1, const double* x2,
                        const double* y2, std::int64_t n2, KsWorkspace& workspace,
-                       KsTies ties = KsTies::strict);
+                       KsTies ties = KsTies::strict, std::int64_t most_tied = ks_every_tie);
 
 // The statistic alone, without the count of tied points. Nothing where the samples are small, or
 // lie so that sorted ones take less time: see the call above.

@@ -105,7 +105,7 @@ public:
       found[sample] = found_[sample];
     }
     tied =
-        samples_.counts_tied
+        samples_.most_tied > 0
             ? KsTiedCounter(samples_, {columns_, in_column_}, {rows_, in_row_}, tied_, at_).count()
             : 0;
     return true;

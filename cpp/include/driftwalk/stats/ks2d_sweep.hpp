@@ -80,9 +80,9 @@ struct KsPlain {
   std::int64_t n[2];
   std::int64_t weight[2]; // as in KsSweep
   std::int64_t total;
-  KsBucketSizes buckets; // ks_bucket_sizes(n[0] + n[1])
-  bool counts_tied;      // else the number of tied points is left at 0
-  void* scratch;         // ks_bounded_bytes(n[0] + n[1]), aligned to 64
+  KsBucketSizes buckets;  // ks_bucket_sizes(n[0] + n[1])
+  std::int64_t most_tied; // counting ends beyond so many tied points; with 0 none are counted
+  void* scratch;          // ks_bounded_bytes(n[0] + n[1]), aligned to 64
 };
 
 // The largest |weight| with an origin of one sample, the row of that origin and the quadrant.

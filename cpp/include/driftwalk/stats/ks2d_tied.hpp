@@ -51,22 +51,18 @@ struct KsBucketed {
 
 class KsTiedCounter {
 public:
-  // `tied`: by point, 1 where it is known already.
+  // `tied`: by point, all zero.
   KsTiedCounter(const KsPlain& samples, const KsBucketed& columns, const KsBucketed& rows,
                 std::uint8_t* tied, char* scratch)
-      : samples_(samples), n_(samples.n[0] + samples.n[1]), tied_(tied),
-        before_(ks_take<std::int32_t>(scratch, n_)), met_(ks_take<std::int32_t>(scratch, n_)) {
+      : samples_(samples), tied_(tied),
+        before_(ks_take<std::int32_t>(scratch, samples.n[0] + samples.n[1])),
+        met_(ks_take<std::int32_t>(scratch, samples.n[0] + samples.n[1])) {
     mark(columns, samples.x);
     mark(rows, samples.y);
   }
 
-  std::int64_t count() const {
-    std::int64_t count = 0;
-    for (std::int64_t i = 0; i < n_; ++i) {
-      count += tied_[i];
-    }
-    return count;
-  }
+  // All, or more than the most that are counted.
+  std::int64_t count() const { return found_; }
 
 private:
   // Every point is compared with those before it in its bucket whose hashes begin with the same
@@ -83,12 +79,18 @@ private:
     std::int32_t* const before = before_;
     const std::int64_t n1 = samples_.n[0];
     std::int32_t count = 0;
-    for (std::int64_t b = 0; b < buckets.count; ++b) {
+    std::uint8_t* const tied = tied_;
+    std::int64_t found = found_;
+    const auto tie = [tied, &found](std::int32_t point) {
+      found += tied[point] == 0;
+      tied[point] = 1;
+    };
+    for (std::int64_t b = 0; b < buckets.count && found <= samples_.most_tied; ++b) {
       const std::int32_t begin = buckets.begin[b];
       const std::int32_t end = buckets.begin[b + 1];
       if (buckets.is_value[b] != 0) {
         for (std::int32_t k = begin; k < end; ++k) {
-          tied_[records[k].point()] = 1;
+          tie(records[k].point());
         }
         continue;
       }
@@ -115,19 +117,21 @@ private:
         for (std::int32_t other = before[k]; other >= begin; other = before[other]) {
           const KsRecord met = records[other];
           if (own.hash() == met.hash() && own.value(values, n1) == met.value(values, n1)) {
-            tied_[own.point()] = tied_[met.point()] = 1;
+            tie(own.point());
+            tie(met.point());
             break;
           }
         }
       }
     }
+    found_ = found;
   }
 
   const KsPlain& samples_;
-  std::int64_t n_;
   std::uint8_t* tied_;   // by point
   std::int32_t* before_; // by place in a bucket
   std::int32_t* met_;    // such places
+  std::int64_t found_ = 0;
 };
 
 DRIFTWALK_LANES_END
