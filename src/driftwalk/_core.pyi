@@ -9,8 +9,8 @@ _Floats = npt.NDArray[np.float64]
 _Place = tuple[float, float, int, int]
 
 # --- the KS statistic ---------------------------------------------------------------------------
-# D1 and D2 in units of 1 / (n1 n2), n1, n2, points that tie (of more than `most_tied` a part), place of
-# D1, place of D2
+# D1 and D2 in units of 1 / (n1 n2), n1, n2, points that tie (a part of more than `most_tied`),
+# place of D1, place of D2
 KsResult = tuple[int, int, int, int, int, _Place, _Place]
 
 class KsReference:

@@ -352,6 +352,12 @@ def test_progress_through_a_pipe_is_plain_lines(study: Path, tmp_path: Path) -> 
     assert "\x1b" not in done.err
 
 
+# On a fast machine the whole run takes no longer than a user's bar waits before it judges.
+JUDGES_AT_ONCE = (
+    "import driftwalk.cli.terminal.progress as progress\nprogress.SECONDS_TO_JUDGE = 0.1\n"
+)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals of POSIX")
 def test_progress_on_a_terminal_is_a_bar_with_the_time_left(study: Path, tmp_path: Path) -> None:
@@ -362,7 +368,7 @@ def test_progress_on_a_terminal_is_a_bar_with_the_time_left(study: Path, tmp_pat
     process = start(
         *words(study, tmp_path / "run", "120s"),
         *("--flow", FLOW),
-        before=NO_FIGURES,
+        before=NO_FIGURES + JUDGES_AT_ONCE,
         stderr=slave,
         stdin=subprocess.DEVNULL,
         env={**os.environ, "TERM": "xterm", "COLUMNS": "100"},
