@@ -137,7 +137,7 @@ class KsReference:
         if method == "peacock":
             return _peacock(self.native, points)
         most = _most_tied(len(self) + len(points), ties, counts_ties)
-        found = self.native.compare(points, ties == "limits", *most)
+        found = self.native.compare(points, ties == "limits", most)
         return _comparison(found, ties, combine, counts_ties)
 
 
@@ -255,7 +255,7 @@ def _compare_once(
     if method == "peacock":
         return _peacock(_core.KsReference(first), second)
     most = _most_tied(len(first) + len(second), ties, counts_ties)
-    found = _core.ks_compare(first, second, ties == "limits", *most)
+    found = _core.ks_compare(first, second, ties == "limits", most)
     return _comparison(found, ties, combine, counts_ties)
 
 
@@ -263,11 +263,11 @@ MANY_TIED: Final = 20
 """One point in so many may be tied before a warning: 5 %, chosen by hand."""
 
 
-def _most_tied(points: int, ties: Ties, counts: bool) -> tuple[int, ...]:
-    """Return how many tied points to count: of a distance alone those that decide on a warning."""
-    if counts:
-        return ()
-    return (points // MANY_TIED if ties == "strict" else 0,)
+def _most_tied(points: int, ties: Ties, counts_ties: bool) -> int:
+    """Return how many tied points to count: all, or those that decide on a warning."""
+    if counts_ties:
+        return points
+    return points // MANY_TIED if ties == "strict" else 0
 
 
 def checked_points(points: npt.ArrayLike, name: str) -> Points:

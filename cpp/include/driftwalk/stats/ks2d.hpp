@@ -86,7 +86,7 @@ private:
   std::unique_ptr<Data> data_;
 };
 
-// Who needs to know only whether more than so many points are tied spares the count of the rest.
+// As `most_tied` below: all tied points are counted. Fewer take less time, none the least.
 constexpr std::int64_t ks_every_tie = std::numeric_limits<std::int64_t>::max();
 
 // The statistic between the reference (sample 1) and the points (x2, y2) (sample 2). The number of

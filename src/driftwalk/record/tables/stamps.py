@@ -117,7 +117,9 @@ class StampReader:
     @property
     def calendar(self) -> str:
         """Origin of the nanoseconds: 1970 in ``UTC`` or in a ``LOCAL`` zone, or a ``DAY``."""
-        return DAY if self.kind == OF_DAY else UTC if self.zoned else LOCAL
+        if self.kind == OF_DAY:
+            return DAY
+        return UTC if self.zoned else LOCAL
 
     def read(self, texts: npt.NDArray[Any]) -> Ticks:
         """Return nanoseconds since 1970, or since midnight; `NO_TIME` where there is no stamp.
