@@ -11,6 +11,17 @@ from chain_runs import chain_runs
 from drifting_tracers import seeded_tank
 from few_simulations import simulate_little
 from fit_worlds import coarse_study, recording
+from fits_of_effects import (
+    fit_of_a_flawed_recording,
+    fit_of_free_bodies,
+    fit_of_glued_blocks,
+    fit_with_a_measured_flow,
+    fit_with_a_measured_series,
+    fit_with_modes,
+    flawed,
+    in_the_alternating_flow,
+    in_the_stirred_flow,
+)
 from made_once import made_once
 from recovery_worlds import small_study
 from self_propelled import moving
@@ -127,8 +138,12 @@ def control_policy() -> xr.Dataset:
     return dw.plan_control(modes, "L3", 20.0, rounds=3, worlds=20)
 
 
+def checked(form: str, recording: xr.Dataset) -> xr.Dataset:
+    return dw.check_model(every_kind(form), recording, replicates=4)
+
+
 def check() -> xr.Dataset:
-    return dw.check_model(every_kind("fit with the angle in the state"), track(), replicates=4)
+    return checked("fit with the angle in the state", track())
 
 
 FORMS: dict[str, Callable[[], xr.Dataset]] = {
@@ -153,7 +168,20 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
         track(), coarse_study(), angle="state"
     ),
     "fit of several flows": switched_fit,
+    "fit with a measured flow": fit_with_a_measured_flow,
+    "fit with a measured series": fit_with_a_measured_series,
+    "fit with modes of the flow": fit_with_modes,
+    "fit of glued blocks": fit_of_glued_blocks,
+    "fit of free bodies": fit_of_free_bodies,
+    "fit of a flawed recording": fit_of_a_flawed_recording,
     "model_check": check,
+    "model_check with a measured flow": lambda: checked(
+        "fit with a measured flow", in_the_stirred_flow()
+    ),
+    "model_check with a measured series": lambda: checked(
+        "fit with a measured series", in_the_alternating_flow()
+    ),
+    "model_check of a flawed recording": lambda: checked("fit of a flawed recording", flawed()),
     "recovery": recovery,
     "model_recovery": model_recovery,
     "assembly": lambda: assemble(small(), FLOW, runs=12, seed=5),

@@ -25,6 +25,15 @@ COSTLY = (
         "outcome_posterior",
         "yield",
         "classification with blocks hidden",
+        "fit with a measured flow",
+        "fit with a measured series",
+        "fit with modes of the flow",
+        "fit of glued blocks",
+        "fit of free bodies",
+        "fit of a flawed recording",
+        "model_check with a measured flow",
+        "model_check with a measured series",
+        "model_check of a flawed recording",
     ),
 )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,7 @@ from driftwalk.likelihood.law.flow_modes import (
 from driftwalk.likelihood.law.force_law import Assumptions, assumptions_of, side_slopes, stated_drag
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
-from driftwalk.likelihood.law.shape_changes import shape_facts
+from driftwalk.likelihood.law.shape_changes import ShapeChange, shape_facts
 from driftwalk.likelihood.measured_flow import agreement_facts, contradictions
 from driftwalk.likelihood.newton import (
     EXCERPT,
@@ -64,7 +64,7 @@ from driftwalk.likelihood.preparation import (
     as_list,
     prepare,
 )
-from driftwalk.likelihood.prior import PRIOR, Weights
+from driftwalk.likelihood.prior import PRIOR
 from driftwalk.likelihood.refuse import (
     BREAKDOWN,
     reason_of_no_solution,
@@ -86,7 +86,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
-@one_blas_thread()
 def fit_motion(
     recordings: xr.Dataset | Sequence[xr.Dataset],
     study: Study | None = None,
@@ -155,94 +154,100 @@ def fit_motion(
     chosen = study if study is not None else Study()
     if earlier is not None:
         chosen = glued_study(chosen, earlier.fit)
-    ready = prepare(as_list(recordings), chosen, angle, body, flow)
-    before = None if earlier is None else estimate_before(earlier)
-    require_one_flow(ready, before)
-    if before is not None:
-        ready = replace(ready, earlier=earlier_prior(ready, before))
-    passes = ready.passes
-    spline = passes.spline
-    starts = _starts(ready, spline, before)
-    assumptions = assumptions_of(
-        chosen, ready.angle, recordings=len(ready.tracks), flows=passes.flows
-    )
-    if before is not None:
-        opened = {**assumptions.opened, "hidden_share": GLUED.first_share}
-        assumptions = replace(assumptions, opened=opened)
-    course = Course(tell or tell_nobody, _usual_parts(passes, interaction=chosen.fit.interaction))
-    reason = reason_of_no_solution(ready.wall_share, ready.tracks, chosen)
-    # The stages stay in one function: they share most of their variables.
-    with solved(reason):
-        passed = _work_listener(course, _usual_search(passes))
-        search = ModeSearch(passes, ready.prior, chosen.fit.iterations, passed)
-        search, laws, law, modes = _laws_with_modes(search, assumptions, starts, ready)
-        passes = search.passes
-        course.begin("drag")
-        try:
-            restricted = restricted_drag(search, law.mode)
-        except BREAKDOWN:
-            # What was opened may have no restricted likelihood; the law without it has one.
-            base = law.base
-            if laws.search.passes is not passes:
-                base = require_mode(search.find(base.point, base.weights, held=FROM_ANOTHER))
-            law = replace(law, mode=base)
-            restricted = restricted_drag(search, law.mode)
-    require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, reason)
-    with solved(reason):
-        innovations = passes.innovations(restricted.point)
-    turning: dict[str, Any] = {}
-    # How the block's spin goes with the water's, where orientations and one flow are.
-    if ready.angle != "none" and ready.intervals.steady:
-        mean = starts.paper.mean_coefficients
-        turning["spin_correlation"] = spin_correlation(mean, thinned(ready.passes))
-    if ready.angle == "state":
-        course.begin("angle as given")
-        given = replace(thinned(ready.with_angle("given").passes), layers=passes.layers)
-        turning |= angle_given_facts(given, search.prior, law.mode, restricted, chosen)
-    with solved(reason):
-        parameters = _parameter_facts(search, law.mode, restricted, ready)
-        for rival in law.rivals:
-            parameters = _with_rival(parameters, search, rival, ready)
-        shape = laws.confounders.shape_change(law.mode)
-    with solved(reason):
-        stirring = (
-            shared_stirring(ready, restricted.point, course)
-            if before is None or earlier is None
-            else glued_stirring(ready, law.mode, restricted.point, before, earlier)
+    # Not a decorator, which would be one frame more between a call and the kernel.
+    with one_blas_thread():
+        ready = prepare(as_list(recordings), chosen, angle, body, flow)
+        before = None if earlier is None else estimate_before(earlier)
+        require_one_flow(ready, before)
+        if before is not None:
+            ready = replace(ready, earlier=earlier_prior(ready, before))
+        passes = ready.passes
+        spline = passes.spline
+        starts = _starts(ready, spline, before)
+        assumptions = _assumptions(ready, before)
+        course = Course(
+            tell or tell_nobody, _usual_parts(passes, interaction=chosen.fit.interaction)
         )
-    facts = {
-        **parameters,
-        **law_facts(law, assumptions),
-        **shape_facts(shape, law.tests),
-        **({"flow_modes_unsettled": modes.unsettled} if modes.unsettled else {}),
-        **turning,
-        **stirring.facts,
-        **whiteness_of(innovations)._asdict(),
-        **ready.facts,
-        **_search_facts(law, restricted),
-        **_agreement(ready, law.mode, restricted),
-        "wetted_depth_m": chosen.wetted_depth_m,
-    }
-    fit = build_fit(ready, law, restricted, facts)
-    shares = visited_shares(fit)
-    unstated = unstated_warning(chosen, about="block")
-    warnings = [] if unstated is None else [unstated]
-    warnings += stirring.warnings
-    for recording, track in zip(ready.recordings, ready.tracks, strict=True):
-        warnings += jump_warnings(recording, body, track=track)
-    warnings += warnings_of(facts, shares, ready.intervals, block=chosen.block)
-    warnings += [*law.unsettled, *law.noted, *contradictions(facts)]
-    warnings += [modes.unsettled] if modes.unsettled else []
-    if shape is not None and shape.significant:
-        warnings.append(shape.sentence)
-    if law.left_out:
-        beside = " and ".join(law.left_out)
-        warnings.append(f"the search for {beside} has no solution and was left out")
-    return described(
-        fit.assign(visited_share=((), min(shares)), **stirring.variables).assign_coords(
-            warning=("warning", texts(warnings))
+        reason = reason_of_no_solution(ready.wall_share, ready.tracks, chosen)
+        # The stages stay in one function: they share most of their variables.
+        with solved(reason):
+            passed = _work_listener(course, _usual_search(passes))
+            search = ModeSearch(passes, ready.prior, chosen.fit.iterations, passed)
+            wanted, known = chosen.fit.flow_modes, ready.earlier
+            weights = first_weights(ready.tracks, spline) if known is None else known.weights
+            modes, begin = find_flow_modes(search, starts.paper, weights, wanted), starts
+            done = False
+            while not done:
+                if modes.start is not None:
+                    search = with_layers(search, modes.layers)
+                    assumptions = replace(
+                        assumptions, opened={**assumptions.opened, **modes.opened}
+                    )
+                    begin, weights = Starts(modes.start, (modes.start,)), modes.weights or weights
+                laws = _law_search(search, assumptions, ready)
+                law = laws.find(begin, weights)
+                whole = law if laws.search is search else _of_all_samples(law, search)
+                if whole is None:
+                    laws = LawSearch(search, assumptions, ready.undisturbed)
+                    whole = laws.find(begin, weights)
+                law = whole
+                done = wanted == "none" or modes.start is not None
+                if not done:
+                    # Under the right law the line may stand out that did not under the paper's.
+                    shape = laws.confounders.shape_change(law.base)
+                    modes = modes_at(laws.search, law.base, shape, wanted)
+                    done = modes.start is None
+            passes = search.passes
+            course.begin("drag")
+            law, restricted = _restricted(search, laws, law)
+        require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, reason)
+        with solved(reason):
+            innovations = passes.innovations(restricted.point)
+        if ready.angle == "state":
+            course.begin("angle as given")
+        turning = _turning_facts(ready, starts, search, law.mode, restricted)
+        with solved(reason):
+            parameters = _parameter_facts(search, law.mode, restricted, ready)
+            for rival in law.rivals:
+                parameters = _with_rival(parameters, search, rival, ready)
+            shape = laws.confounders.shape_change(law.mode)
+        with solved(reason):
+            stirring = (
+                shared_stirring(ready, restricted.point, course)
+                if before is None or earlier is None
+                else glued_stirring(ready, law.mode, restricted.point, before, earlier)
+            )
+        facts = {
+            **parameters,
+            **law_facts(law, assumptions),
+            **shape_facts(shape, law.tests),
+            **({"flow_modes_unsettled": modes.unsettled} if modes.unsettled else {}),
+            **turning,
+            **stirring.facts,
+            **whiteness_of(innovations)._asdict(),
+            **ready.facts,
+            **_search_facts(law, restricted),
+            **_agreement(ready, law.mode, restricted),
+            "wetted_depth_m": chosen.wetted_depth_m,
+        }
+        fit = build_fit(ready, law, restricted, facts)
+        shares = visited_shares(fit)
+        warnings = [
+            *_recording_warnings(ready, body, stirring.warnings),
+            *warnings_of(facts, shares, ready.intervals, block=chosen.block),
+            *law.unsettled,
+            *law.noted,
+            *contradictions(facts),
+            *_flow_warnings(modes, shape),
+        ]
+        if law.left_out:
+            names = " and ".join(law.left_out)
+            warnings.append(f"the search for {names} has no solution and was left out")
+        return described(
+            fit.assign(visited_share=((), min(shares)), **stirring.variables).assign_coords(
+                warning=("warning", texts(warnings))
+            )
         )
-    )
 
 
 def _starts(ready: PreparedRecordings, spline: Spline, before: Estimate | None) -> Starts:
@@ -253,57 +258,93 @@ def _starts(ready: PreparedRecordings, spline: Spline, before: Estimate | None) 
     return Starts(glued, (glued,))
 
 
-def _laws_with_modes(
-    search: ModeSearch, assumptions: Assumptions, starts: Starts, ready: PreparedRecordings
-) -> tuple[ModeSearch, LawSearch, LawResult, FlowModes]:
-    """Return the search, that of the law, its result, and the modes of the flow with which."""
-    wanted, modes = ready.study.fit.flow_modes, FlowModes()
-    known = ready.earlier
-    weights = first_weights(ready.tracks, search.passes.spline) if known is None else known.weights
-    if wanted != "none":
-        modes = find_flow_modes(search, starts.paper, weights, wanted)
-    if modes.start is None:
-        laws, law = _laws_of(search, assumptions, starts, weights, ready)
-        if wanted != "none":
-            # Under the right law the line may stand out that did not under the paper's.
-            modes = modes_at(laws.search, law.base, laws.confounders.shape_change(law.base), wanted)
-        if modes.start is None:
-            return search, laws, law, modes
-    search = with_layers(search, modes.layers)
-    assumptions = replace(assumptions, opened={**assumptions.opened, **modes.opened})
-    found = Starts(modes.start, (modes.start,))
-    laws, law = _laws_of(search, assumptions, found, modes.weights or weights, ready)
-    return search, laws, law, modes
+def _recording_warnings(
+    ready: PreparedRecordings, body: str | None, of_stirring: Sequence[str]
+) -> Iterator[str]:
+    """Yield what is not stated, what the blocks say of the stirring, and jumps of the tracker."""
+    unstated = unstated_warning(ready.study, about="block")
+    if unstated is not None:
+        yield unstated
+    yield from of_stirring
+    for recording, track in zip(ready.recordings, ready.tracks, strict=True):
+        yield from jump_warnings(recording, body, track=track)
 
 
-def _laws_of(
-    search: ModeSearch,
-    assumptions: Assumptions,
-    starts: Starts,
-    weights: Weights,
+def _flow_warnings(modes: FlowModes, shape: ShapeChange | None) -> Iterator[str]:
+    """Yield why no modes of the flow were fitted, and how its shape changes."""
+    if modes.unsettled:
+        yield modes.unsettled
+    if shape is not None and shape.significant:
+        yield shape.sentence
+
+
+def _restricted(
+    search: ModeSearch, laws: LawSearch, law: LawResult
+) -> tuple[LawResult, Restricted]:
+    """Return the restricted likelihood, and the law with the mode that has one."""
+    try:
+        return law, restricted_drag(search, law.mode)
+    except BREAKDOWN:
+        # What was opened may have no restricted likelihood; the law without it has one.
+        base = law.base
+        if laws.search.passes is not search.passes:
+            base = require_mode(search.find(base.point, base.weights, held=FROM_ANOTHER))
+        return replace(law, mode=base), restricted_drag(search, base)
+
+
+def _turning_facts(
     ready: PreparedRecordings,
-) -> tuple[LawSearch, LawResult]:
-    """Return the search of the law and its result, of a fast camera from samples further apart."""
-    passes = search.passes
-    few = thinned(passes)
-    if few is not passes:
+    starts: Starts,
+    search: ModeSearch,
+    mode: Mode,
+    restricted: Restricted,
+) -> dict[str, Any]:
+    """Return how the spin goes with the water's, and C_d with the orientation as an input."""
+    facts: dict[str, Any] = {}
+    if ready.angle != "none" and ready.intervals.steady:
+        mean = starts.paper.mean_coefficients
+        facts["spin_correlation"] = spin_correlation(mean, thinned(ready.passes))
+    if ready.angle == "state":
+        given = thinned(ready.with_angle("given").passes)
+        given = replace(given, layers=search.passes.layers)
+        facts |= angle_given_facts(given, search.prior, mode, restricted, ready.study)
+    return facts
 
-        def undisturbed() -> list[Series]:
-            return [one.thinned(EXCERPT.interval_s) for one in ready.undisturbed()]
 
-        def of_all(mode: Mode) -> Mode | None:
-            return search.find(mode.point, mode.weights, held=FROM_THINNED)
+def _assumptions(ready: PreparedRecordings, before: Estimate | None) -> Assumptions:
+    """Return what is stated of the law; of glued blocks the drag of hidden faces is opened."""
+    flows = ready.passes.flows
+    found = assumptions_of(ready.study, ready.angle, recordings=len(ready.tracks), flows=flows)
+    if before is None:
+        return found
+    return replace(found, opened={**found.opened, "hidden_share": GLUED.first_share})
 
-        laws = LawSearch(replace(search, passes=few), assumptions, undisturbed)
-        law = laws.find(starts, weights)
-        mode, rivals = of_all(law.mode), [of_all(one) for one in law.rivals]
-        if mode is not None and mode.converged:
-            known = tuple(one for one in rivals if one is not None and one.converged)
-            base = mode if law.base is law.mode else law.base
-            noted = law.noted if len(known) == len(rivals) else ()
-            return laws, replace(law, mode=mode, base=base, rivals=known, noted=noted)
-    laws = LawSearch(search, assumptions, ready.undisturbed)
-    return laws, laws.find(starts, weights)
+
+def _law_search(
+    search: ModeSearch, assumptions: Assumptions, ready: PreparedRecordings
+) -> LawSearch:
+    """Return the search of the law, of a fast camera on samples that are further apart."""
+    few = thinned(search.passes)
+    if few is search.passes:
+        return LawSearch(search, assumptions, ready.undisturbed)
+
+    def undisturbed() -> list[Series]:
+        return [one.thinned(EXCERPT.interval_s) for one in ready.undisturbed()]
+
+    return LawSearch(replace(search, passes=few), assumptions, undisturbed)
+
+
+def _of_all_samples(law: LawResult, search: ModeSearch) -> LawResult | None:
+    """Return a law of thinned samples with the modes of all, None if its own does not converge."""
+    mode, *rivals = (
+        search.find(one.point, one.weights, held=FROM_THINNED) for one in (law.mode, *law.rivals)
+    )
+    if mode is None or not mode.converged:
+        return None
+    known = tuple(one for one in rivals if one is not None and one.converged)
+    base = mode if law.base is law.mode else law.base
+    noted = law.noted if len(known) == len(rivals) else ()
+    return replace(law, mode=mode, base=base, rivals=known, noted=noted)
 
 
 def _parameter_facts(

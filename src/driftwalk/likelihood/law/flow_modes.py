@@ -28,7 +28,7 @@ from driftwalk.likelihood.preparation import Estimate, PreparedRecordings
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.schema.answers.force_law import LEAST_EVIDENCE
 
-Wanted = Literal["auto", "1", "2"]
+Wanted = Literal["none", "auto", "1", "2"]
 
 
 class FlowModesPolicy(NamedTuple):
@@ -112,6 +112,8 @@ def find_flow_modes(
 
     Whether the flow changes its shape, and how, hardly depends on the law; the law depends on it.
     """
+    if wanted == "none":
+        return FlowModes()
     search = replace(search, passes=thinned(search.passes))
     steady = search.find_from_afar(start, weights)
     line = None if steady is None else line_of(search.passes, steady)
