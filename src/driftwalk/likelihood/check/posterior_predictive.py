@@ -19,7 +19,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.power import POWER
 from driftwalk.likelihood.check.replicates import Replicates
-from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR
+from driftwalk.schema.answers.facts import GOODNESS
 
 BAND: Final = 0.9
 """Share of the replicates within the bands of the densities."""
@@ -58,7 +58,8 @@ class MotionComparison(NamedTuple):
     @property
     def far(self) -> bool:
         """Whether the recording is far from replicates at the estimate."""
-        return float(np.median(self.distance)) > FAR_ABOVE_FLOOR * float(np.median(self.floor))
+        floor = float(np.median(self.floor))
+        return float(np.median(self.distance)) > GOODNESS.far_above_floor * floor
 
     @property
     def rank_p_value(self) -> float:

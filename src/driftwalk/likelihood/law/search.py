@@ -34,7 +34,7 @@ from driftwalk.likelihood.newton import (
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.start import Starts
-from driftwalk.schema.answers.force_law import LEAST_EVIDENCE, OPENED_SIGMAS
+from driftwalk.schema.answers.force_law import SELECTION
 
 
 class LawPolicy(NamedTuple):
@@ -139,7 +139,7 @@ class LawSearch:
     ) -> LawResult:
         """Return the law with another power of the drag where it has more evidence."""
         powered = self._with_power(base, starts, weights)
-        if powered is not None and self._ahead(powered.mode, found.mode) > LEAST_EVIDENCE:
+        if powered is not None and self._ahead(powered.mode, found.mode) > SELECTION.least_evidence:
             return powered
         return found
 
@@ -177,7 +177,7 @@ class LawSearch:
         if linear > LAW.doubted_linear_sigmas:
             return True
         numbers = set(sigmas) - set(FLOATING)
-        if any(abs(sigmas[name]) > OPENED_SIGMAS for name in numbers):
+        if any(abs(sigmas[name]) > SELECTION.opened_sigmas for name in numbers):
             return True
         return self._turns_by_itself(paper) or self._stays_on_a_small_orbit()
 
@@ -201,7 +201,7 @@ class LawSearch:
         own = tests.chi_squared(dict.fromkeys(names, 0.0))
         other = tests.chi_squared({name: FLOATING[name] for name in names})
         apart = 0.5 * (other - own)
-        settled_by = max(apart, 0.0) if apart < LEAST_EVIDENCE else math.inf
+        settled_by = max(apart, 0.0) if apart < SELECTION.least_evidence else math.inf
         return replace(self._alone(paper, floating=False), settled_by=settled_by, tests=tests)
 
     def _compared(self, starts: Starts, weights: Weights, paper: Mode | None) -> LawResult:
@@ -221,7 +221,7 @@ class LawSearch:
         ahead = evidence.get("floating", -math.inf) - evidence.get("paper", -math.inf)
         whole = series is search.passes.series
         held = FROM_NEAR if whole else FROM_ANOTHER
-        if ahead >= LEAST_EVIDENCE:
+        if ahead >= SELECTION.least_evidence:
             near = found["floating"]
             mode: Mode | None = near
             if not (near.converged and whole):
@@ -266,7 +266,7 @@ class LawSearch:
             mode is None
             or not mode.converged
             or not is_retained(mode, "drag_power", self.selection.least)
-            or self._ahead(mode, base.mode) <= LEAST_EVIDENCE
+            or self._ahead(mode, base.mode) <= SELECTION.least_evidence
         ):
             return None
         return self.selection.select(replace(base, mode=mode, tests=None))
@@ -287,7 +287,7 @@ class LawSearch:
         if rival is None:
             return found
         ahead = self._ahead(rival, mode)
-        if ahead <= LEAST_EVIDENCE:
+        if ahead <= SELECTION.least_evidence:
             return found
         prior = self.search.prior
         paper, floating = (rival, mode) if found.floating else (mode, rival)
@@ -353,7 +353,7 @@ class LawSearch:
     def _with_rival(self, found: LawResult, starts: Starts) -> LawResult:
         """Return the law, and the other one as well where the recording cannot tell them."""
         blind = found.floating and self.search.passes.body.orientation == "none"
-        least = LAW.without_orientation if blind else LEAST_EVIDENCE
+        least = LAW.without_orientation if blind else SELECTION.least_evidence
         if self.assumptions.pressure_gradient != "auto" or found.settled_by >= least:
             return found
         rival = self._other_law(found, starts)

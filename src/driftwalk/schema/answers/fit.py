@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.errors import InputError
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import (
-    FAR_ABOVE_FLOOR,
+    GOODNESS,
     facts_of,
     flat_variables,
     is_open,
@@ -191,7 +191,7 @@ def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
     if not isfinite(distance):
         return [*parts, Row("KS distance", f"not available: {check.attrs['ks_left_out']}")]
     explains = verdict is not None and verdict.explains
-    far = explains and distance > FAR_ABOVE_FLOOR * floor
+    far = explains and distance > GOODNESS.far_above_floor * floor
     more = ": far, but within the uncertainty of the fit" if far else ""
     parts.append(Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{more}"))
     chance = float(check.attrs.get("ks_p_value", "nan"))
