@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from driftwalk.viewer import Source
 
 FLOW_SEED = 1
+"""Seed of the random flow where none is given: the playground is the same each time."""
 BLOCKS = 4
+"""Blocks where the study states no number: as many as in a study file that says nothing."""
 
 
 @with_study_options(

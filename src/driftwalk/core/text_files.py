@@ -18,6 +18,7 @@ from typing import Any, Final
 from driftwalk.core.errors import FormatError
 
 MIB: Final = 1 << 20
+"""Bytes of a mebibyte."""
 
 
 def read_bounded(path: str | Path, *, most: int) -> bytes:
@@ -199,6 +200,7 @@ def _integer(digits: str) -> int | float:
 
 
 MOST_LEVELS: Final = 64
+"""Depth of nested values: far below the depth at which Python's own recursion ends (1000)."""
 
 
 def refuse_deep(values: Any, *, path: str | Path | None = None) -> None:

@@ -18,7 +18,7 @@ from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.law.candidate_laws import NUMBERS
-from driftwalk.likelihood.prior import LEVER, MOST_FACTOR, Prior, Weights
+from driftwalk.likelihood.prior import LEVER, PRIOR, Prior, Weights
 from driftwalk.likelihood.refuse import BREAKDOWN, cholesky
 
 Tell = Callable[[int, int, str], None]
@@ -283,7 +283,9 @@ def limited(step: Floats, drag: int, opened: Sequence[str] = ()) -> Floats:
     """
     shorter = step * min(1.0, SEARCH.most_log_drag_step / max(abs(float(step[drag])), 1e-300))
     for index, power in ((1, 1.0), (2, 2.0)):
-        factor = np.clip(1.0 + power * step[drag + index], 1.0 / MOST_FACTOR, MOST_FACTOR)
+        factor = np.clip(
+            1.0 + power * step[drag + index], 1.0 / PRIOR.most_factor, PRIOR.most_factor
+        )
         shorter[drag + index] = math.log(factor) / power
     numbers = step.size - len(opened)
     levers = slice(drag + LEVER, numbers)

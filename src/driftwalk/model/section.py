@@ -119,6 +119,7 @@ class Quantity:
 
 
 Seed = Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)]
+"""What a 64-bit integer of a NetCDF file holds."""
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 
 _PREFIXES: Final = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
+"""SI prefix by power of ten."""
 _PREFIXED: Final = ("m", "s", "N", "m/s", "Hz")
 
 

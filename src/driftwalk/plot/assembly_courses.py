@@ -40,8 +40,10 @@ SURVIVAL: Final = {
     "first_contact": ("no two blocks have met", style.BLUE, "-"),
     "completion": ("not yet one assembly", style.ORANGE, (0, (5, 2))),
 }
+"""Words, colour and dashes of each time until an event."""
 
 BAR_WIDTH: Final = 0.76
+"""Of the place of a bar: neighbours stay apart. Chosen by eye."""
 COMPACT: Final = "compactness"
 GROWTH: Final = {
     "mean size": {"mean_size": "mean size"},

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 Marginals = Literal["shown", "none"]
 BINS = 48
+"""Bins along each axis, fine enough for the eye; chosen by eye."""
 # Axes and bins reach over the central part of the steps; one wild step must not squeeze the rest.
 SHOWN_FRACTION = 0.9995
 DENSITY_LABEL = "density of steps (% mm⁻¹ °⁻¹)"

@@ -108,6 +108,7 @@ class TextPolicy(NamedTuple):
 TEXT: Final = TextPolicy()
 
 _BUFFER: Final = 1 << 20
+"""Bytes that are read ahead: few calls of the decoder in Python for each block; chosen by hand."""
 GZIP_MAGIC = b"\x1f\x8b"
 BOM = b"\xef\xbb\xbf"
 

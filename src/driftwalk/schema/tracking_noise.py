@@ -210,6 +210,7 @@ def _bounded(estimate: _Estimate, track: Track) -> _Estimate:
 
 
 _NOTHING = _Estimate(math.nan, math.nan, math.nan, 0)
+"""Stands where nothing can be estimated."""
 
 
 @remembered

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Assembly
 
 QUARTER: Final = math.pi / 2
+"""A turn from one face of a square block to the next [rad]."""
 # Time stamps are decimal numbers: 0.8 - 0.3 must count as half a second.
 ROUNDING: Final = 1e-9
 

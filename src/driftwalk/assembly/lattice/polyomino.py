@@ -19,6 +19,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import (
     NAMED_SHAPES,
+    STEPS,
     Cell,
     Cells,
     cells_of_shape,
@@ -33,8 +34,6 @@ Chirality = Literal["merged", "distinct"]
 LARGEST: Final = 10
 """Largest size of which all shapes are listed: there are 4655, and four times more per cell."""
 
-STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
-"""From a cell to its neighbour at each face."""
 _MIRRORED: Final = frozenset({"Z", "J"})
 # Cells before gaps, and wide shapes before narrow ones.
 _BY_CELLS: Final = str.maketrans("x/.", "012")

@@ -33,6 +33,7 @@ EARLY: Final = "a tenth of the time"
 KINDS: Final = (CLASSES, TIMES, BOTH, JOINS, EARLY)
 """Kinds of data: what is seen of every run."""
 EARLY_PART: Final = 0.1
+"""The part of the time that `EARLY` names; chosen by hand."""
 REST: Final = "rest"
 
 

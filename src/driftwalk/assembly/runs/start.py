@@ -13,12 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.lattice.polyomino import STEPS
 from driftwalk.assembly.outcomes.outcome_classes import overlap_depth
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.schema.shapes import cells_of_shape
+from driftwalk.schema.shapes import STEPS, cells_of_shape
 from driftwalk.simulation.backend import wall_depth
 
 if TYPE_CHECKING:

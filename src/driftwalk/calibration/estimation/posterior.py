@@ -136,6 +136,8 @@ class PosteriorPolicy(NamedTuple):
     """A solution lies within the box about the region."""
     near: float = 1.1
     """Earlier simulations within this part of a region count for its emulator."""
+    fewest_estimates: int = 40
+    """Estimates of simulated recordings without which their bias and scatter would be chance."""
 
 
 POSTERIOR: Final = PosteriorPolicy()

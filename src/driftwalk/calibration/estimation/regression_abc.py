@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.estimation.synthetic_likelihood import CONSTANT
+from driftwalk.calibration.estimation.synthetic_likelihood import SYNTHETIC
 from driftwalk.calibration.evolution import rounded
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
@@ -100,7 +100,9 @@ def sequential_regression(
 
 def _require_change(summaries: Floats) -> None:
     """Refuse a model that moves in the same way whatever its parameters and random numbers are."""
-    varies = np.ptp(summaries, axis=0) > CONSTANT * (np.abs(summaries).max(axis=0) + CONSTANT)
+    varies = np.ptp(summaries, axis=0) > SYNTHETIC.constant * (
+        np.abs(summaries).max(axis=0) + SYNTHETIC.constant
+    )
     if not varies.any():
         raise InputError(
             "the model moves in the same way at all settings of its parameters: check that it uses "

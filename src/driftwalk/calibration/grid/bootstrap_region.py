@@ -62,6 +62,9 @@ class BootstrapPolicy(NamedTuple):
     """Recordings of a work unit; all of a unit meet the same replicate."""
     floor_references: int = 8
     """Recordings whose distances to the others give the noise floor."""
+    supported: float = 0.99
+    """Sum of the weights of a place above which its settings say what the surface is there: it is 1
+    but for rounding where they do."""
 
 
 BOOTSTRAP: Final = BootstrapPolicy()
@@ -123,7 +126,7 @@ def build_surface(problem: Problem, refined: RefinedMap) -> StoredSurface:
     simulated = binary_dilation(low, structure=np.ones((3,) * low.ndim, dtype=np.bool_))
     smoother = make_smoother(axes, bandwidth=bandwidth, weights=simulated.astype(float))
     # Weights add up to 1 wherever there are settings to say what the surface is.
-    supported = smoother.matrix.sum(axis=1).reshape(height.shape) > 0.99
+    supported = smoother.matrix.sum(axis=1).reshape(height.shape) > BOOTSTRAP.supported
     retained = (height <= BOOTSTRAP.retained_floors) & supported
     cells = np.flatnonzero(simulated)
     settings = [values.ravel()[cells] for values in np.meshgrid(*axes, indexing="ij")]

@@ -19,7 +19,7 @@ from driftwalk.schema.answers.facts import AnswerParts, texts
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
 
 HELD_OUT_REPLICATES: Final = 20
-"""Worlds by which the answer of a search is judged."""
+"""Worlds by which the answer of a search is judged; chosen by hand."""
 
 
 class HeldOutScore(NamedTuple):

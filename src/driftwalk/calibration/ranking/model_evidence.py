@@ -14,7 +14,7 @@ from driftwalk.calibration.estimation.label_switching import label_order
 from driftwalk.calibration.estimation.regression_abc import REGRESSION
 from driftwalk.calibration.estimation.summaries import SummaryObjective
 from driftwalk.calibration.estimation.synthetic_likelihood import (
-    SIMULATIONS,
+    SYNTHETIC,
     synthetic_likelihood_at,
 )
 from driftwalk.calibration.evolution import rounded
@@ -190,9 +190,9 @@ def ranking_sentence(
 def most_settings(parameters: int, replicates: int) -> int:
     """Return how many settings `estimate_evidence` simulates at most."""
     if not parameters:
-        return SIMULATIONS + replicates
+        return SYNTHETIC.simulations + replicates
     narrow = EVIDENCE.starts * simulations_of(parameters)[0] * GAUSS_NEWTON.most_rounds
-    return REGRESSION.most_simulations + narrow + SIMULATIONS + replicates
+    return REGRESSION.most_simulations + narrow + SYNTHETIC.simulations + replicates
 
 
 @one_blas_thread()

@@ -44,10 +44,12 @@ _ROWS: list[tuple[str, str, float]] = [
     ("  standard error (deg)", "orientation_noise_standard_error_rad", 57.29577951308232),
     ("identity ambiguous (%)", "ambiguous_share", 100),
 ]
+"""Rows of a recording: label, name of the fact, and the factor from SI to the unit shown."""
 _CIRCLE_ROWS: list[tuple[str, str, float]] = [
     ("circle of centres: radius (cm)", "radius_m", 100),
     ("  rim visited (%)", "sectors_visited_share", 100),
 ]
+"""The same of the circle that is fitted to the positions."""
 _OF_A_RECORDING: list[tuple[str, str, float]] = [
     ("tracks", "tracks_used", 1),
     ("samples", "samples_used", 1),

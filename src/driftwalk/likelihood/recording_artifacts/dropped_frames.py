@@ -42,9 +42,13 @@ CONTROL_LENGTHS: Final = (0.5, 1.5, 2.5)
 """Lengths that no dropped frame makes. Quick movements of an animal, or a clock that is not
 regular, make them as often as double ones."""
 DROPS: Final = tuple(range(1, MOST_MISSING + 1))
+"""Classes of a place: so many frames were dropped there."""
 CONTROL, WRONG, BOUNCE, JUMP = range(MOST_MISSING + 1, MOST_MISSING + 5)
+"""Further classes: a control length, a wrong place, a contact, a jump."""
 CLEAN: Final = 0
+"""Class of a place where nothing is wrong."""
 CLASSES: Final = JUMP + 1
+"""Number of classes, of which `JUMP` is the last."""
 
 
 class Axis(NamedTuple):
@@ -99,6 +103,7 @@ def patterns_of(lengths: Floats, stamped: float) -> list[Pattern]:
 
 
 _USUAL: Final = patterns_of(np.ones(WIDTH - 1), 1.0)
+"""Patterns of a window without a gap; those of others differ in their times alone."""
 KIND: Final = np.array([one.kind for one in _USUAL])
 """Of each pattern; the same for every window."""
 AT_MIDDLE: Final = np.array([one.at == MIDDLE for one in _USUAL])

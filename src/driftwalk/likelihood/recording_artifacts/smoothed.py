@@ -53,11 +53,15 @@ SMOOTHING: Final = SmoothingPolicy()
 FREQUENCIES: Final = 1024
 """Frequencies of a spectrum before the taper, all around the circle."""
 TURN: Final = 2.0 * np.pi * np.arange(FREQUENCIES) / FREQUENCIES
+"""Frequencies around the circle [rad per sample]."""
 HANN: Final = np.hanning(SMOOTHING.segment + 2)[1:-1]
+"""Hann's window without its zeros at the ends."""
 TAPER: Final = HANN / np.sqrt((HANN**2).sum())
+"""The same of unit power, so that a spectrum keeps its level."""
 BAND: Final = slice(int(np.ceil(SMOOTHING.lowest_frequency * SMOOTHING.segment)), None)
 """Where a segment's spectrum is compared."""
 _SEEN_AT: Final = np.arange(SMOOTHING.segment // 2 + 1)[BAND] / SMOOTHING.segment
+"""Frequencies of the band [cycles per sample]."""
 
 
 class Smoothing(NamedTuple):

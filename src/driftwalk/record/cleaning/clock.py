@@ -149,6 +149,7 @@ class CounterPolicy(NamedTuple):
 
 COUNTER: Final = CounterPolicy()
 _BITS: Final = (8, 10, 12, 15, 16, 20, 24, 31, 32)
+"""Widths of counters of cameras and controllers that are known to roll over."""
 
 
 def unwrap_counters(raw: RawRecording) -> list[str]:

@@ -25,6 +25,7 @@ _STATED: Final = re.compile(
 )
 _CORNERS: Final = ("x1", "y1", "x2", "y2")
 _QUAD: Final = tuple(f"{axis}{corner}" for corner in range(1, 5) for axis in "xy")
+"""Corners of a box in turn, as x1, y1 to x4, y4."""
 _FROM_ZERO: Final = {"x0": "x1", "y0": "y1", "x1": "x2", "y1": "y2"}
 _OF_QUAD: Final = re.compile(r"(?:tag)?(?:c|corner|p|pt)([0-4])([xy])")
 

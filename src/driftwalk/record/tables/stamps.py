@@ -16,7 +16,9 @@ Ticks = Integers
 Texts = npt.NDArray[np.bytes_]
 
 SECOND_NS: Final = 1_000_000_000
+"""Nanoseconds of a second."""
 DAY_NS: Final = 86_400 * SECOND_NS
+"""Nanoseconds of a day without a leap second, as in POSIX time."""
 _BYTES: Final = 201
 """More bytes than a time stamp has, of some 40 as a rule; chosen by hand."""
 NO_TIME: Final = int(np.iinfo(np.int64).min)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LISTED_COMPONENTS: Final = 3
+"""Components whose shares are listed: with three of them, most of the variance is said."""
 _REFERENCE: Final = (
     *("complete", "runs", "realisations", "left_out", "blocks", "latching", "hidden_face_drag"),
     *("drag_coefficient", "force_std_N", "force_interval_s"),

@@ -15,6 +15,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.core.units import in_percent
 from driftwalk.track.detect.markers import (
+    LEAST_HUE_DIFFERENCE,
     ChromaTables,
     MarkerColour,
     TwoColourMarker,
@@ -46,7 +47,6 @@ class TeachPolicy(NamedTuple):
 
 _TEACH: Final = TeachPolicy()
 
-_LEAST_HUE_DIFFERENCE: Final = math.radians(30.0)
 _NAMES: Final = (
     ("red", 25.0),
     ("orange", 60.0),
@@ -56,6 +56,7 @@ _NAMES: Final = (
     ("blue", 285.0),
     ("magenta", 330.0),
 )
+"""Hue of each colour in CIELAB [degrees]; the nearest names a disc."""
 
 
 @dataclass(frozen=True)
@@ -238,7 +239,7 @@ def propose_markers(
     best: tuple[int, float, TwoColourMarker, list[tuple[int, Disc, Disc]]] | None = None
     for first, second in combinations(seen, 2):
         ordered = sorted((first.colour, second.colour), key=lambda c: c.hue_rad % (2 * math.pi))
-        if hue_difference(*ordered) < _LEAST_HUE_DIFFERENCE:
+        if hue_difference(*ordered) < LEAST_HUE_DIFFERENCE:
             continue
         tried = _measure(cv2, images, camera, ordered, block_side)
         if tried is not None and (best is None or (tried[0], -tried[1]) > (best[0], -best[1])):

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 POSITION_DIGITS: Final = 5
+"""Decimals of a position [m]: a hundredth of a millimetre, below a pixel of any screen."""
 SETTLED_S: Final = 0.3
 """Time after the last change of a setting at which all browsers receive the values in force [s]."""
 LONGEST_ADVANCE_S: Final = 0.1
