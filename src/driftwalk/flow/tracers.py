@@ -393,6 +393,8 @@ def flow_from_tracers(
     if inside.time.size == 0:
         raise InputError(_none_inside(steps))
     noise = _noise(trajectory, steps) if position_noise is None else position_noise
+    # Beyond the wall there is no flow to agree with: such steps would count as neighbours of true
+    # ones.
     judged = judge_steps(inside, noise=noise)
     false = judged.is_false(outlier_threshold)
     kept = inside.select(~false)

@@ -303,6 +303,7 @@ def plot_density_panels(
     length_mm = MM_PER_M * calibration["step_length_edge"].values
     angle_deg = DEGREES * calibration["turning_angle_edge"].values
     densities = [recorded, *(setting.density for setting in settings)]
+    # One scale of colour for all panels: they are compared with each other.
     top = max(
         float(density_of(density, length_mm, angle_deg).max(initial=0.0)) for density in densities
     )

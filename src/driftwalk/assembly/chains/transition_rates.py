@@ -157,6 +157,8 @@ def kinetics(
     best = int(scores.mean(axis=1).argmax())
     behind = scores - scores[best]
     error = behind.std(axis=1, ddof=1) / np.sqrt(found.runs)
+    # Forms stand with the simplest first: of those within a standard error of the best, the first
+    # is taken, as the runs do not show that they need more.
     chosen = int(np.flatnonzero(behind.mean(axis=1) >= -error)[0])
     model = fit(found, FORMS[chosen])
     pairs = np.argwhere(np.sum([counts_and_times(one)[0] for one in sets], axis=0) > 0)

@@ -246,6 +246,7 @@ def observed_of(given: Outcomes, *, after: float | None, breaks: bool = False) -
         breaks |= any("event_kind" in one for one in datasets)
         length, until = _known_until(found, breaks=breaks)
         earliest = int(until.argmin())
+        # All runs are read at one time, the last at which the class of each of them is known.
         if after is None:
             after = float(min(until[earliest], length.max()))
         if after > until[earliest]:

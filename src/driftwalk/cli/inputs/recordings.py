@@ -179,6 +179,7 @@ def opening_note(
     from driftwalk.model import Study, load_study
 
     file = Study() if given.file is None else load_study(given.file)
+    # Keys that another option states along with its own.
     also = {"block.depth_m": "block.depth", "block.side_m": "block.shape"}
 
     def stated(key: str, text: str) -> str:

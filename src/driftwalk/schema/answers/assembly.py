@@ -95,6 +95,7 @@ def assembly_answer(
         parts.append(_classes(found, drawn))
     else:
         parts += _sizes(found, sizes, "parameters found" if drawn is not None else "")
+        # Many blocks hardly ever end in the same class: sizes are compared there, not classes.
         if drawn is not None and sizes_drawn is not None:
             parts += _sizes(drawn, sizes_drawn, "parameters drawn")
     for event in ("first_contact", "completion"):

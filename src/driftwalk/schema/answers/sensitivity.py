@@ -60,6 +60,7 @@ def sensitivity_answer(
         f"reference: {facts['blocks']} blocks, C_d = {facts['drag_coefficient']:.4g}, "
         f"σ_F = {1e3 * facts['force_std_N']:.4g} mN, {facts['realisations']} realisations",
         _reference_table(reference),
+        # Said before the map: a distance below it is no difference.
         f"l1 distance of two realisations: {facts['mean_pairwise_l1']:.4f} on average; "
         f"{facts['expected_pairwise_l1']:.4f} is expected from the number of runs alone",
         *_distances(l1, smallest),
