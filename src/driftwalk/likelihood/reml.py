@@ -299,7 +299,6 @@ def due_share(passes: Passes, prior: Floats, point: Point) -> float:
 
 
 def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other: Floats) -> None:
-    """Add A and B of a series."""
     body, spline = passes.body, passes.spline
     # Many samples within a tenth of a second tell the same.
     states, time = passes.states(series, point)[:: series.pooled], series.time[:: series.pooled]

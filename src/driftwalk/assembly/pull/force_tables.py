@@ -337,21 +337,7 @@ def _stepped(
     tables: PullTables, faces: RadialForce, others: list[float], *,
     nearest: float, mass: float, step: float,
 ) -> PullTables:  # fmt: skip
-    """Part the force of two faces; where it is near up to its end, all acts in each step.
-
-    Parameters
-    ----------
-    tables : PullTables
-        The tables without steps of their own.
-    faces : RadialForce
-        Attraction of the faces.
-    others : list of float
-        How far the other forces reach [m], which act in each step.
-    nearest : float
-        Least distance from which all may be distant [m].
-    mass, step : float
-        Mass of a block with the water that it moves [kg], and time step [s].
-    """
+    """Part the force of two faces; where it is near up to its end, all acts in each step."""
     reach = np.geomspace(nearest, faces.cutoff, 2000)
     curved = np.abs(np.gradient(faces(reach), reach)) * 4.0 * (STEPPING.every * step) ** 2 / mass
     near = float(reach[np.flatnonzero(np.append(True, curved[:-1] > STEPPING.stiffness))[-1]])

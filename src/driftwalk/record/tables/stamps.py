@@ -184,13 +184,7 @@ def how_to_write(text: str) -> str:
 
 
 def _ascii(texts: Texts) -> Texts:
-    """Return texts in an array as wide as the longest of them; a word that is no ASCII is empty.
-
-    Raises
-    ------
-    RowError
-        At a text that is too long, or no ASCII and no word for a missing time.
-    """
+    """Return texts in an array as wide as the longest of them; a word that is no ASCII is empty."""
     letters = texts.view(np.uint8).reshape(texts.size, -1)
     highest = letters.max(axis=0, initial=0)
     if highest.max() > 127 or highest[_BYTES - 1 :].any():

@@ -349,7 +349,6 @@ def _describe(a_star: Floats, b_star: Floats, pixels: int) -> ColourSeen | None:
 
 
 def _name(hue_rad: float) -> str:
-    """Return the word for a hue."""
 
     def off(degrees: float) -> float:
         return abs(math.remainder(hue_rad - math.radians(degrees), 2 * math.pi))

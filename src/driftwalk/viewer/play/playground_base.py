@@ -262,7 +262,6 @@ class Playground(Source):
         return section("controls", "controls", "Settings", self.controls_note, items=items)
 
     def _page(self) -> dict[str, Any]:
-        """Return the whole page."""
         recording = None if self.recording is None else self.recording.steps.name
         title = "Step length and turning angle"
         return page_frame(
