@@ -29,9 +29,9 @@ class WallWarningPolicy(NamedTuple):
     """When a recording is near a wall often enough for its friction to count. Chosen by hand."""
 
     notable_share: float = 0.05
-    """Share of the samples near the wall above which a warning is given."""
+    """Share of the samples near the wall above which a warning is given; chosen by hand."""
     reach_m: float = 0.002
-    """How far a block may move from one sample to the next [m]."""
+    """How far a block may move from one sample to the next [m]; chosen by hand."""
 
 
 WALL_WARNING: Final = WallWarningPolicy()

@@ -179,12 +179,13 @@ class LinkPolicy(NamedTuple):
     """Which steps are false links."""
 
     threshold: float = 4.0
-    """Normalised deviation of a false link. With 16 neighbours, 0.2 % of steps that scatter as
-    a Gaussian around the same velocity reach it."""
+    """Normalised deviation of a false link. Chance: with 16 neighbours, 0.2 % of steps that scatter
+    as a Gaussian around the same velocity reach it."""
     neighbours: int = 16
     """Steps of other tracks with which a step is compared; chosen by hand."""
     fewest: int = 8
-    """Neighbours without which a step is not judged: as a vector on a grid of PIV has."""
+    """Neighbours without which a step is not judged: by convention as many as a vector on a grid of
+    PIV has."""
     searched: tuple[int, ...] = (32, 128)
     """Nearest steps among which those of other tracks are looked for: few, then more; chosen by
     hand."""

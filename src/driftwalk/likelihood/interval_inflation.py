@@ -34,7 +34,7 @@ class InflationPolicy(NamedTuple):
     a coverage of 90 % on 64 recordings (studies/likelihood, sets synthetic and ode)."""
     without_angle: tuple[float, ...] = (1.4, 1.4, 1.1)
     """Of ln C_d, ln q and ln r with the angle as an input or not used. Calibrated in the same way
-    on 32 recordings."""
+    on 32 recordings (studies/likelihood)."""
     number: float = 1.3
     """Of the numbers of departures. Chosen by hand, as the factor of ln C_d."""
     most_factor: float = 10.0

@@ -64,10 +64,11 @@ class RemlPolicy(NamedTuple):
     the motion does not follow the model, or tells nothing of C_d. Chosen by hand."""
     true_pull: float = 0.67
     """The pull of a disc's prior on the true flow, over that on the fitted one, whose errors add to
-    it. The first 29 recordings of known flow; it was not chosen by their C_d."""
+    it. Measured on the first 29 recordings of known flow; it was not chosen by their C_d."""
     most_noise_move: float = 1.0
     """Largest move of ln(tracking noise) along the ridge of a criterion that has a minimum: beyond
-    it nothing holds the noise. In recordings of the model it moves by some hundredths."""
+    it nothing holds the noise. Chosen by hand: in recordings of the model it moves by some
+    hundredths."""
 
 
 REML: Final = RemlPolicy()

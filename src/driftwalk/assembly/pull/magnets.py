@@ -136,7 +136,7 @@ class MultipolePolicy(NamedTuple):
     """Where the closed form holds; lengths in largest sides of the magnet."""
 
     nearest: float = 2.5
-    """Least distance of the fit; there the energy is within 1.2 % of the largest."""
+    """Least distance of the fit; measured: there the energy is within 1.2 % of the largest."""
     farthest: float = 16.0
     """Largest distance of the fit; beyond, the closed form is extrapolated."""
     softening: float = 0.1

@@ -34,11 +34,14 @@ class RegionPolicy(NamedTuple):
     """How large the region is that is simulated for a posterior sample. Chosen by hand."""
 
     spread: float = 1.5
-    """Standard deviation of the settings along every axis, in those of the sample."""
+    """Standard deviation of the settings along every axis, in those of the sample; chosen by
+    hand."""
     widest: float = 0.3
-    """Largest half-width, in parts of the ranges: an emulator does not hold in more."""
+    """Largest half-width, in parts of the ranges: an emulator does not hold in more; chosen by
+    hand."""
     narrowest: float = 0.003
-    """Smallest standard deviation, in parts of the ranges: keeps the covariance regular."""
+    """Smallest standard deviation, in parts of the ranges: keeps the covariance regular; chosen by
+    hand."""
 
 
 REGION: Final = RegionPolicy()
@@ -117,25 +120,26 @@ class PosteriorPolicy(NamedTuple):
     """
 
     size: int = 512
-    """Settings of the posterior sample."""
+    """Settings of the posterior sample; chosen by hand."""
     walkers: int = 64
-    """Walkers of the chain: several for each of at most a dozen parameters."""
+    """Walkers of the chain: several for each of at most a dozen parameters; chosen by hand."""
     steps: int = 600
-    """Steps of each walker; the first half is left out."""
+    """Steps of each walker; the first half is left out; chosen by hand."""
     begin: float = 0.3
-    """Walkers begin within this part of the standard deviations of the solution."""
+    """Walkers begin within this part of the standard deviations of the solution; chosen by hand."""
     inner: float = 0.9
-    """Walkers begin within this part of the region."""
+    """Walkers begin within this part of the region; chosen by hand."""
     most_rounds: int = 8
-    """A bound on the time."""
+    """A bound on the time; chosen by hand."""
     stays: float = 0.5
-    """A mean that moves by less, in standard deviations, has come to rest."""
+    """A mean that moves by less, in standard deviations, has come to rest; chosen by hand."""
     alike: float = 1.3
-    """Largest growth of a standard deviation at rest; a sample cut off by a region grows by 1.5."""
+    """Largest growth of a standard deviation at rest; chosen by hand, as a sample cut off by a
+    region grows by 1.5."""
     reach: float = 1.0
-    """A solution lies within the box about the region."""
+    """A solution lies within the box about the region; chosen by hand."""
     near: float = 1.1
-    """Earlier simulations within this part of a region count for its emulator."""
+    """Earlier simulations within this part of a region count for its emulator; chosen by hand."""
     fewest_estimates: int = 40
     """Estimates of simulated recordings without which their bias and scatter would be chance."""
 

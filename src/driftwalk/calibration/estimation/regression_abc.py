@@ -27,19 +27,21 @@ class RegressionPolicy(NamedTuple):
     """Sequential regression from the whole ranges to a trust region. Chosen by hand."""
 
     simulations: int = 256
-    """Simulations of a round: some two for each of a hundred summaries, a power of two."""
+    """Simulations of a round: some two for each of a hundred summaries, a power of two; chosen by
+    hand."""
     most_rounds: int = 6
-    """A bound on the time."""
+    """A bound on the time; chosen by hand."""
     wide_errors: float = 2.5
-    """Half-width of the next box in standard errors: 99 % of a normal law."""
+    """Half-width of the next box in standard errors: chance goes beyond it once in a hundred."""
     narrow: float = 0.05
-    """Errors, in parts of the ranges, at which a quadratic holds in the box."""
+    """Errors, in parts of the ranges, at which a quadratic holds in the box; chosen by hand."""
     lost: float = 0.2
-    """Larger errors say next to nothing: a uniform distribution has 0.29."""
+    """Larger errors say next to nothing: a uniform distribution has 0.29 in closed form."""
     ridges: tuple[float, ...] = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
-    """Ridge penalties that are tried; each parameter takes that of the least error."""
+    """Ridge penalties that are tried; each parameter takes that of the least error; chosen by
+    hand."""
     bounded: float = 2.0
-    """Summaries count as at most this many standard deviations from the usual."""
+    """Summaries count as at most this many standard deviations from the usual; chosen by hand."""
 
     @property
     def most_simulations(self) -> int:

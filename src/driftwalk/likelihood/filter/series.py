@@ -58,7 +58,7 @@ class FilterPolicy(NamedTuple):
     studies/verdict at the wall nine have 50 and more."""
     largest_prior_std: float = 0.1
     """Standard deviation of a velocity above which nothing is expected [m/s]: as much as a velocity
-    may be where nothing is known of it (`unknown_speed` of the filter)."""
+    may be where nothing is known of it (`unknown_speed` of the filter); chosen by hand."""
     settling_samples: int = 3
     """Samples left out after a missing frame when other explanations of an error are tried: in
     these a wrong place counts in the filter's velocity. Chosen by hand."""

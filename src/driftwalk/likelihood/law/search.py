@@ -48,8 +48,8 @@ class LawPolicy(NamedTuple):
     deviations. Under the
     paper's law eight floating bodies had one of 3 to 18 (docs/explanation/likelihood.md)."""
     decisive_evidence: float = 100.0
-    """Difference of the log evidences that nothing missing has feigned. Pulses of the flow feigned
-    10; right laws are ahead by 130 and more where the recording tells them at all."""
+    """Difference of the log evidences that nothing missing has feigned. Measured: pulses of the
+    flow feigned 10; right laws are ahead by 130 and more where the recording tells them at all."""
     slight_sigmas: float = 4.0
     """A power of the drag that is too slight to be opened widens the intervals from this score test
     on [standard deviations]: chance exceeds it once in 16,000. A power of 2.12 had 5.4 in ten
@@ -64,11 +64,11 @@ class LawPolicy(NamedTuple):
     that float had 67 and more (studies/bodies)."""
     lever_sigmas: float = 1.64
     """A lever of the force counts when it is above the notable one by this many standard
-    deviations: 5 % of the recordings whose lever is just notable."""
+    deviations: by chance 5 % of the recordings whose lever is just notable."""
     notable_lever: float = 0.005
     """Lever of the force, in sides of the block, above which the turning does not follow the model.
-    On recordings of the model it comes out at 0.001 to 0.004, with angles 5 degrees off at
-    0.015."""
+    Measured: on recordings of the model it comes out at 0.001 to 0.004, with angles 5 degrees off
+    at 0.015."""
 
 
 LAW: Final = LawPolicy()

@@ -201,9 +201,10 @@ class DroppedFramesPolicy(NamedTuple):
     """Share of the interval by which the stamps of a constant rate may be off: they may be rounded.
     Chosen by hand."""
     evidence: float = 30.0
-    """Log likelihood ratio from which on frames are missing. It is 0.0 on recordings of the model
-    at 10 Hz and at most 27 on recordings of animals and robots, but for one whose control says that
-    it means nothing; with one frame in twenty missing it is 128 and more after ten minutes."""
+    """Log likelihood ratio from which on frames are missing. Measured: it is 0.0 on recordings of
+    the model at 10 Hz and at most 27 on recordings of animals and robots, but for one whose control
+    says that it means nothing; with one frame in twenty missing it is 128 and more after ten
+    minutes."""
     most_control: float = 0.5
     """Share of the dropped frames' rate up to which the rate of the control lengths may go. Chosen
     by hand."""
@@ -211,7 +212,8 @@ class DroppedFramesPolicy(NamedTuple):
     """The same before any frame is found, when two in one window pass for something else. Chosen by
     hand."""
     rounds: int = 6
-    """Most rounds: frames that are found change what is expected of their neighbours."""
+    """Most rounds: frames that are found change what is expected of their neighbours; chosen by
+    hand."""
     first_rate: float = 3e-3
     """Rate of everything at which the expectation-maximisation begins. Chosen by hand."""
     longest_span: int = 21

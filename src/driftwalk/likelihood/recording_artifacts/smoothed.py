@@ -29,24 +29,25 @@ class SmoothingPolicy(NamedTuple):
     segment: int = 64
     """Second differences in a segment; segments overlap by half. Chosen by hand."""
     fewest_segments: int = 8
-    """Segments of x and y together without which nothing is said: 16 s at 10 Hz."""
+    """Segments of x and y together without which nothing is said: 16 s at 10 Hz; chosen by hand."""
     lowest_frequency: float = 0.08
     """Cycles per sample: below, the flow rules the motion. Chosen by hand."""
     orbit_frequency: float = 0.2
-    """Cycles per sample: above, the evidence has to be clear too. Blocks in the core of an eddy
-    went round with 0.09 to 0.13 of them: such a line next to the noise looks like smoothing."""
+    """Cycles per sample: above, the evidence has to be clear too. Measured: blocks in the core of
+    an eddy went round with 0.09 to 0.13 of them: such a line next to the noise looks like
+    smoothing."""
     evidence: float = 50.0
-    """Log likelihood ratio from which on positions are smoothed. Recordings of the model reach 2,
-    300 random tracks 10; smoothed ones reach 50 in half a minute at 10 Hz."""
+    """Log likelihood ratio from which on positions are smoothed. Measured: recordings of the model
+    reach 2, 300 random tracks 10; smoothed ones reach 50 in half a minute at 10 Hz."""
     most_deviance_left: float = 0.15
-    """Share of the deviance of a motion and its noise that smoothing may leave. Smoothed recordings
-    of the model leave 0.01 of it; those of animals and robots, whose reason is another, 0.25 and
-    more."""
+    """Share of the deviance of a motion and its noise that smoothing may leave. Measured: smoothed
+    recordings of the model leave 0.01 of it; those of animals and robots, whose reason is another,
+    0.25 and more."""
     clearly: float = 10.0
     """Log likelihood ratio over all other ways of smoothing when a way is named. Chosen by hand."""
     independent: float = 0.36
-    """Degrees of freedom of the spectrum in one of its numbers: neighbours in frequency and
-    overlapping segments are correlated by the taper."""
+    """Degrees of freedom of the spectrum in one of its numbers: measured, as neighbours in
+    frequency and overlapping segments are correlated by the taper."""
 
 
 SMOOTHING: Final = SmoothingPolicy()

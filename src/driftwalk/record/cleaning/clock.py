@@ -23,11 +23,12 @@ class ClockPolicy(NamedTuple):
     """Interval beyond which milliseconds of a video are likelier than so slow a camera; chosen
     by hand."""
     last_day_s: float = 1e10
-    """Seconds since 1970 until the year 2286."""
+    """Seconds since 1970 until the year 2286; chosen by hand."""
     first_day_s: float = 1e8
     """Three years: a clock beyond them counts from 1970; chosen by hand."""
     longest_recording_s: float = 1e12
-    """30,000 years; powers of much longer times are beyond float64."""
+    """30,000 years; by the range of float64, in closed form: powers of much longer times are beyond
+    float64."""
     first_serial: float = 15_000.0
     """Days since 1900 of the year 1941, as spreadsheets count them; chosen by hand."""
     last_serial: float = 80_000.0

@@ -49,21 +49,21 @@ class SelectionPolicy(NamedTuple):
     """Least effect of a linear part: a smaller one may be an error of the filter. Chosen by hand,
     as the least effects that follow (studies/misfit/power.py shows what they let through)."""
     drag_power: float = 0.15
-    """Least change of the drag's power."""
+    """Least change of the drag's power; chosen by hand."""
     force_memory: float = 0.04
-    """Least memory of the force [s]."""
+    """Least memory of the force [s]; chosen by hand."""
     time_noise: float = 0.003
-    """Least jitter of the time stamps [s]."""
+    """Least jitter of the time stamps [s]; chosen by hand."""
     angle_offset_deg: float = 1.0
     """Least offset of the angle [degrees]. The eight strips of a face feign up to 1.2 degrees in
     blocks that float and spin fast (two recordings of studies/verdict; one of them was fitted again
     with 32, and no offset was left)."""
     marker: float = 0.012
-    """Least offset of the marker, in sides of the block."""
+    """Least offset of the marker, in sides of the block; chosen by hand."""
     strength: float = 0.01
-    """Least amplitude of the line or of a cosine of the flow's strength."""
+    """Least amplitude of the line or of a cosine of the flow's strength; chosen by hand."""
     pulse: float = 0.02
-    """Least amplitude of a pulse."""
+    """Least amplitude of a pulse; chosen by hand."""
 
 
 SELECTION: Final = SelectionPolicy()
