@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 Image = npt.NDArray[np.uint8]
 
 _FINE: Final = 3
-"""Points along each side of a pixel at which coverage is found."""
+"""Points along each side of a pixel at which coverage is found; chosen by hand."""
 _STEP_PX: Final = 0.4
 """Way of a block between two exposures of a frame [px]: below the blur of an edge; chosen by
 hand."""

@@ -193,7 +193,7 @@ class LinkPolicy(NamedTuple):
 
 LINKS: Final = LinkPolicy()
 _CHUNK: Final = 1 << 14
-"""Steps whose neighbours are looked up at once: some 40 MB."""
+"""Steps whose neighbours are looked up at once: some 40 MB; chosen by hand."""
 
 
 class Judged(NamedTuple):

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FRAMES_PER_PERIOD: Final = 32
-"""Frames of a flow with modes; linear between them, an amplitude comes out 0.2 % too small."""
+"""Frames of a flow with modes; linear between them, an amplitude comes out 0.2 % too small in
+closed form."""
 
 
 class FramePolicy(NamedTuple):

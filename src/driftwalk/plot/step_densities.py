@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 Marginals = Literal["shown", "none"]
 BINS = 48
 """Bins along each axis, fine enough for the eye; chosen by eye."""
-# Axes and bins reach over the central part of the steps; one wild step must not squeeze the rest.
+# Axes and bins reach over the central part of the steps; one wild step must not squeeze the rest;
+# chosen by hand.
 SHOWN_FRACTION = 0.9995
 DENSITY_LABEL = "density of steps (% mm⁻¹ °⁻¹)"
 MM_PER_M = FACTORS["m", "mm"]

@@ -30,7 +30,7 @@ PATH_RUNS: Final = 4
 PATH_INTERVAL_S: Final = 0.1
 """Time between samples of such a path [s]: ten frames a second are smooth to the eye."""
 PATH_SAMPLES: Final = 6000
-"""Most samples of a path that is kept; longer runs are sampled more rarely."""
+"""Most samples of a path that is kept; longer runs are sampled more rarely; chosen by hand."""
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,9 @@ from driftwalk.viewer.hub import Content, Publish, Source, parsed
 from driftwalk.viewer.server import LAST_PORT
 
 SAID_EVERY_S: Final = 5.0
-"""Time after which new counts are said [s]; a new reason is said at once."""
+"""Time after which new counts are said [s]; a new reason is said at once; chosen by hand."""
 MOST_REASONS: Final = 3
-"""Reasons that are named of each kind, the most frequent ones."""
+"""Reasons that are named of each kind, the most frequent ones; chosen by hand."""
 KINDS: Final = {
     "line": ("line", "lines"),
     "frame": ("whole frame", "whole frames"),
@@ -252,7 +252,7 @@ FORMAT: Final = "driftwalk live"
 VERSION: Final = 1
 """Of the stream; another version is refused."""
 LONGEST_LINE: Final = 1 << 25
-"""Longest line [byte] that is read: a frame with a large image."""
+"""Longest line [byte] that is read: a frame with a large image; chosen by hand."""
 FIRST_PAUSE_S: Final = 0.25
 """Pause before the first new attempt to connect [s]; it doubles up to a second. By hand."""
 WIDTHS: Final = range(16, 4097)

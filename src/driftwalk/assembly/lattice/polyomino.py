@@ -32,7 +32,8 @@ from driftwalk.schema.shapes import (
 Chirality = Literal["merged", "distinct"]
 
 LARGEST: Final = 10
-"""Largest size of which all shapes are listed: there are 4655, and four times more per cell."""
+"""Largest size of which all shapes are listed: there are 4655, and four times more per cell; chosen
+by hand."""
 
 _MIRRORED: Final = frozenset({"Z", "J"})
 # Cells before gaps, and wide shapes before narrow ones.

@@ -482,7 +482,7 @@ def _oriented(energy: Energy, contact: float, end: float, *, of_magnets: bool) -
 
 
 SHOWN_GAP_M: Final = 0.010
-"""Gap at which the force is stated: an easy one to set with a spacer."""
+"""Gap at which the force is stated: an easy one to set with a spacer; chosen by hand."""
 CURVE_POINTS: Final = 400
 """Gaps of the curve, smooth to the eye; chosen by hand."""
 

@@ -131,7 +131,7 @@ def _parent(order: list[tuple[int, int]], cell: tuple[int, int]) -> tuple[int, i
 
 
 TOUCHING_M = 1e-9
-"""Depth up to which blocks and walls may touch at the start [m]."""
+"""Depth up to which blocks and walls may touch at the start [m]; chosen by hand."""
 
 
 def require_room(study: Study) -> None:

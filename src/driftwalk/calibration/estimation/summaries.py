@@ -31,7 +31,8 @@ Instants = Callable[[Floats], Bools]
 """Which instants [s] count."""
 
 SMALLEST: Final = 0.02
-"""Logarithms of step lengths begin at this part of the usual step: a rest has one, too."""
+"""Logarithms of step lengths begin at this part of the usual step: a rest has one, too; chosen by
+hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,7 +339,8 @@ def _bouts(one: Series, level: float) -> Numbers:
 
 
 ALIKE: Final = 16
-"""Settings in a row that are seen by one camera. So many points of a Sobol' sequence fill a box."""
+"""Settings in a row that are seen by one camera. So many points of a Sobol' sequence fill a box;
+chosen by hand."""
 POINT: Final = "point"
 """Settings of a unit, in the unit cube; they travel with it."""
 

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 LAGS: Final = (1, 3, 10, 30, 100)
-"""Of the mean squared displacement, in step intervals."""
+"""Of the mean squared displacement, in step intervals; chosen by hand."""
 CHECKS: Final = (*(f"displacement_{lag}" for lag in LAGS), "speed_time", "wall_share", "rest_share")
 UNITS: Final = (*("m2" for _ in LAGS), "s", "1", "1")
 

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 
 FIT_TANK: Final = 0.5
-"""Share of the rim that was visited from which on the tank can be taken from the positions."""
+"""Share of the rim that was visited from which on the tank can be taken from the positions; chosen
+by hand."""
 
 
 def read_for_run(

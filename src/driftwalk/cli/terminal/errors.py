@@ -36,7 +36,7 @@ _SYNONYMS = {
     "convert": "driftwalk read",
 }
 _LONGEST = 1500
-"""Characters of a message; it may quote what a file holds."""
+"""Characters of a message; it may quote what a file holds; chosen by hand."""
 
 
 class PastTyper(Exception):

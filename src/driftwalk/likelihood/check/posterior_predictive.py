@@ -22,11 +22,11 @@ from driftwalk.likelihood.check.replicates import Replicates
 from driftwalk.schema.answers.facts import GOODNESS
 
 BAND: Final = 0.9
-"""Share of the replicates within the bands of the densities."""
+"""Share of the replicates within the bands of the densities; by convention."""
 BINS: Final = 40
 """Bins of a density. Chosen by hand."""
 FEWEST_REPLICATES: Final = 4
-"""Sound replicates of either set: two on either side of the noise floor."""
+"""Sound replicates of either set: two on either side of the noise floor; chosen by hand."""
 
 
 class Density(NamedTuple):

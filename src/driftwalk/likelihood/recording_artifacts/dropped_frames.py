@@ -31,16 +31,16 @@ from driftwalk.schema import Track
 from driftwalk.schema.tracking_noise import estimate_tracking_noise
 
 WIDTH: Final = 8
-"""Samples of a window, four on either side of the interval in question."""
+"""Samples of a window, four on either side of the interval in question; chosen by hand."""
 MIDDLE: Final = 3
 """Which of the window's intervals is the one in question."""
 MOST_MISSING: Final = 3
-"""Missing frames in one interval that are looked for."""
+"""Missing frames in one interval that are looked for; chosen by hand."""
 WINDOWS_AT_ONCE: Final = 16_384
 """Windows that are whitened at a time: some 50 MB."""
 CONTROL_LENGTHS: Final = (0.5, 1.5, 2.5)
 """Lengths that no dropped frame makes. Quick movements of an animal, or a clock that is not
-regular, make them as often as double ones."""
+regular, make them as often as double ones; chosen by hand."""
 DROPS: Final = tuple(range(1, MOST_MISSING + 1))
 """Classes of a place: so many frames were dropped there."""
 CONTROL, WRONG, BOUNCE, JUMP = range(MOST_MISSING + 1, MOST_MISSING + 5)

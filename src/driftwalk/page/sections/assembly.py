@@ -294,7 +294,7 @@ def _left_out(found: dict[str, xr.Dataset]) -> list[str]:
 
 
 MOST_CURVES = 8
-"""Classes whose lifetimes are drawn, those with the most time."""
+"""Classes whose lifetimes are drawn, those with the most time; chosen by hand."""
 
 
 def steady_sections(steady: xr.Dataset) -> list[Section]:

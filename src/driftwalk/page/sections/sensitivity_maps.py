@@ -31,7 +31,7 @@ NOT_REACHED: Final = "Blank if fewer than half of the runs reached it."
 MOST_SLICES: Final = 12
 """Slices of a study that a page shows; chosen by eye."""
 MOST_COUNTS: Final = 6_000_000
-"""Numbers of runs that the maps of a page hold together: some 4 MB of it."""
+"""Numbers of runs that the maps of a page hold together: some 4 MB of it; chosen by hand."""
 
 
 def require_axes(sensitivity: xr.Dataset) -> None:

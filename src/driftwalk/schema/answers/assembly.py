@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 MOST_ROWS: Final = 16
-"""Classes in the table: all 12 of four blocks, and the frequent ones of more."""
+"""Classes in the table: all 12 of four blocks, and the frequent ones of more; chosen by hand."""
 SHOWN_TIMES: Final = 4
 """Times in the table of sizes, equally far apart, the last one the end of the runs."""
 _OVER_TIME: Final = {

@@ -47,7 +47,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 TELLING_SHARE: Final = 0.02
-"""Share of the intervals at the wall from which there may be enough contacts to estimate it."""
+"""Share of the intervals at the wall from which there may be enough contacts to estimate it; chosen
+by hand."""
 _ATTRIBUTES: Final = (
     *("angle", "force_law", "force_law_stated", "drag_law", "drag_law_stated", "wall_left_out"),
     *("measured_flow", "measured_flow_errors"),

@@ -19,7 +19,7 @@ SIMULATED: Final = "This recording was simulated, not measured."
 LABEL_WIDTH: Final = 22
 """Column of the values in a terminal: most labels are shorter; chosen by eye."""
 DIGITS: Final = 4
-"""Significant digits of a number; more where its interval is narrower."""
+"""Significant digits of a number; more where its interval is narrower; chosen by hand."""
 
 
 class Row(NamedTuple):

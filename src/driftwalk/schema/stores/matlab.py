@@ -14,7 +14,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.schema.stores.netcdf import most_bytes, refuse_huge
 
 MOST_ELEMENTS: Final = 200_000
-"""Elements of an array of structs or cells that are read."""
+"""Elements of an array of structs or cells that are read; chosen by hand."""
 _SIZES: Final = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "single": 4, "logical": 1}
 """Bytes of an element by MATLAB's class; all others have 8."""
 OLD: Final = b"MATLAB 5.0 MAT-file"

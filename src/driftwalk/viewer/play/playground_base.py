@@ -34,9 +34,11 @@ if TYPE_CHECKING:
 POSITION_DIGITS: Final = 5
 """Decimals of a position [m]: a hundredth of a millimetre, below a pixel of any screen."""
 SETTLED_S: Final = 0.3
-"""Time after the last change of a setting at which all browsers receive the values in force [s]."""
+"""Time after the last change of a setting at which all browsers receive the values in force [s];
+chosen by hand."""
 LONGEST_ADVANCE_S: Final = 0.1
-"""Longest time for which the tank is advanced at once [s]; on a slow machine it falls behind."""
+"""Longest time for which the tank is advanced at once [s]; on a slow machine it falls behind;
+chosen by hand."""
 ACTIONS: Final[dict[str, str]] = {
     "restart": "restart",
     "pause": "pause",

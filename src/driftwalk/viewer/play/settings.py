@@ -11,7 +11,8 @@ from driftwalk.core.errors import InputError
 from driftwalk.model.assembly import MOST_BLOCKS
 
 FILLED: Final = 0.4
-"""Share of the tank that blocks may cover; squares placed at random jam at about half."""
+"""Share of the tank that blocks may cover; squares placed at random jam at about half; chosen by
+hand."""
 
 Kind = Literal["range", "choice"]
 
