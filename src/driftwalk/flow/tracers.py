@@ -107,7 +107,7 @@ def track_steps(trajectory: xr.Dataset) -> FoundSteps:
             "Name the column of the identities with `columns`"
         )
     interval = np.diff(time)[first]
-    near = interval <= 1.5 * float(np.median(interval))
+    near = interval <= _TRACERS.across * float(np.median(interval))
     sure = np.ones(first.size, dtype=bool)
     if "ambiguous" in trajectory:
         unsure = (trajectory["ambiguous"].values.T > 0.0)[body, row]
@@ -156,8 +156,7 @@ def step_noise(steps: Steps) -> float:
     if steps.time.size < 4:
         return math.nan
     in_a_row = np.lib.stride_tricks.sliding_window_view(steps.goes_on, 3).all(axis=1)
-    # With fewer fourth differences the noise is not known.
-    if np.count_nonzero(in_a_row) < 50:
+    if np.count_nonzero(in_a_row) < _TRACERS.fewest_in_a_row:
         return math.nan
     window = np.flatnonzero(in_a_row)[:, None] + np.arange(4)
     interval = steps.interval[window]
@@ -313,6 +312,10 @@ class TracerPolicy(NamedTuple):
     """Share of false links above which the linking as a whole is in doubt; chosen by hand."""
     long_step: float = 1.0
     """Median step, in cells, above which the steps blur the field; chosen by hand."""
+    across: float = 1.5
+    """Usual intervals beyond which a step is one across a gap; chosen by hand."""
+    fewest_in_a_row: int = 50
+    """Fourth differences without which the noise of positions is not known; chosen by hand."""
 
 
 _TRACERS: Final = TracerPolicy()

@@ -173,6 +173,8 @@ class DesignPolicy(NamedTuple):
     spread: float = 0.5
     """Power of the posterior that places further nodes: below one, its surroundings get some;
     chosen by hand."""
+    fewest: int = 20
+    """Runs of a node, or truths, without which none is begun; chosen by hand."""
 
 
 DESIGN_POLICY = DesignPolicy()
@@ -267,8 +269,8 @@ def check_outcomes(
     chosen = Study() if study is None else study
     observed = observed_of(given, after=after, breaks=chosen.assembly.bonds_break)
     for name, number in (("runs", runs), ("truths", truths)):
-        if number < 20:
-            raise InputError(f"{name}: expected at least 20, got {number}")
+        if number < DESIGN_POLICY.fewest:
+            raise InputError(f"{name}: expected at least {DESIGN_POLICY.fewest}, got {number}")
     if observed.blocks != chosen.assembly.blocks:
         raise InputError(
             f"the outcomes have {observed.blocks} blocks, and the study has "

@@ -142,6 +142,14 @@ class PosteriorPolicy(NamedTuple):
     """Earlier simulations within this part of a region count for its emulator; chosen by hand."""
     fewest_estimates: int = 40
     """Estimates of simulated recordings without which their bias and scatter would be chance."""
+    many: float = 1.5
+    """Simulations near a region, in halves of those of a round, from which on it may be at rest;
+    chosen by hand."""
+    as_wide: float = 0.99
+    """Part of the widest region from which on one counts as that wide; chosen by hand."""
+    behind: float = 10.0
+    """Deviance by which a mode is behind when it is ruled out; chosen by hand, as covariances come
+    from simulations: a discrepancy of a hundred has an error of some 5."""
 
 
 POSTERIOR: Final = PosteriorPolicy()
@@ -192,7 +200,7 @@ def sample_posterior(
         sample = _chain(emulator, region, recorded[0], solution, seed + number + 1)
         moved = sample.mean(axis=0) - region.centre
         std = sample.std(axis=0)
-        enough = np.count_nonzero(near) >= 1.5 * half
+        enough = np.count_nonzero(near) >= POSTERIOR.many * half
         if enough and _stayed(moved, std, region):
             break
         if number < POSTERIOR.most_rounds - 1:
@@ -205,7 +213,9 @@ def _stayed(moved: Floats, std: Floats, region: Region) -> bool:
 
     A parameter along which the region cannot grow is as wide as it will be.
     """
-    alike = (std < POSTERIOR.alike * region.std) | (region.width > 0.99 * REGION.widest)
+    alike = (std < POSTERIOR.alike * region.std) | (
+        region.width > POSTERIOR.as_wide * REGION.widest
+    )
     return bool((np.abs(moved) < POSTERIOR.stays * std).all() and alike.all())
 
 
@@ -286,9 +296,8 @@ def find_modes(
         if not any(_reaches(one, posterior.sample.mean(axis=0)) for one in found):
             found.append(posterior)
     deviance = np.array([_deviance(one) for one in found])
-    # The covariances come from simulations: a discrepancy of a hundred has an error of some 5. So
-    # a place is ruled out only where it is behind by 10.
-    order = [k for k in np.argsort(deviance, kind="stable") if deviance[k] - deviance.min() < 10.0]
+    behind = deviance - deviance.min()
+    order = [k for k in np.argsort(deviance, kind="stable") if behind[k] < POSTERIOR.behind]
     weights = np.exp(-0.5 * (deviance[order] - deviance.min()))
     return Modes(tuple(found[place] for place in order), weights / weights.sum())
 

@@ -42,6 +42,9 @@ class RegressionPolicy(NamedTuple):
     hand."""
     bounded: float = 2.0
     """Summaries count as at most this many standard deviations from the usual; chosen by hand."""
+    as_large: float = 0.9
+    """Part of the last errors above which errors no longer shrink, and the rounds end; chosen by
+    hand."""
 
     @property
     def most_simulations(self) -> int:
@@ -92,7 +95,7 @@ def sequential_regression(
         before, regression = regression, _ridge_regression(settings, summaries, recorded)
         if regression.error.max() < REGRESSION.narrow or (number and not regression.found):
             break
-        if number and (regression.error > 0.9 * before.error).all():
+        if number and (regression.error > REGRESSION.as_large * before.error).all():
             break
         reach = REGRESSION.wide_errors * regression.error
         low = np.clip(regression.centre - reach, 0.0, 1.0 - REGRESSION.narrow)

@@ -49,6 +49,8 @@ class SmoothingPolicy(NamedTuple):
     """Degrees of freedom of the spectrum in one of its numbers: neighbours in frequency and
     overlapping segments are correlated by the taper. Chosen by hand, below the 0.48 that white
     noise has in closed form."""
+    uneven: float = 0.1
+    """Share of the usual interval by which one may differ within a segment; chosen by hand."""
 
 
 SMOOTHING: Final = SmoothingPolicy()
@@ -130,7 +132,7 @@ def _spectrum(track: Track) -> tuple[Floats, int]:
     if interval.size < SMOOTHING.segment + 1:
         return np.zeros(0), 0
     usual = float(np.median(interval))
-    breaks = np.flatnonzero(np.abs(interval - usual) > 0.1 * usual) + 1
+    breaks = np.flatnonzero(np.abs(interval - usual) > SMOOTHING.uneven * usual) + 1
     total, count = np.zeros(SMOOTHING.segment // 2 + 1), 0
     for first, last in zip([0, *breaks], [*breaks, track.time.size], strict=True):
         for axis in (track.x, track.y):

@@ -37,6 +37,8 @@ class ClockPolicy(NamedTuple):
     """Shortest interval of a likely camera [s]; chosen by hand."""
     slowest_s: float = 2.0
     """Longest interval of a likely camera [s]; chosen by hand."""
+    of_calendar: float = 0.9
+    """Share of the steps that are whole hours in a calendar; chosen by hand."""
 
 
 CLOCK: Final = ClockPolicy()
@@ -107,7 +109,7 @@ def _steps(clocks: list[Array]) -> Array:
 
 def _whole_hours(steps: Array) -> bool:
     """Whether the steps are those of a calendar: one sample every six hours, or a day."""
-    return bool((steps % 3600.0 == 0.0).mean() > 0.9)
+    return bool((steps % 3600.0 == 0.0).mean() > CLOCK.of_calendar)
 
 
 def _remedy(column: str, first: float, interval: float) -> str:
@@ -146,6 +148,9 @@ class CounterPolicy(NamedTuple):
     chosen by hand."""
     seldom: float = 0.05
     """Share of the steps that go back, up to which the clock starts over; chosen by hand."""
+    own: float = 0.9
+    """Share of the times that are of one part alone, with fewer of which the parts are bodies;
+    chosen by hand."""
 
 
 COUNTER: Final = CounterPolicy()
@@ -223,7 +228,7 @@ def overlap(clock: Array) -> bool:
 
     Parts with most of their times in common are several bodies, which another check refuses.
     """
-    if np.unique(clock).size < 0.9 * clock.size:
+    if np.unique(clock).size < COUNTER.own * clock.size:
         return False
     starts = np.append(0, np.flatnonzero(np.diff(clock) < 0) + 1)
     ends = np.append(starts[1:], clock.size) - 1
