@@ -250,7 +250,7 @@ VALUES: Final[dict[str, Check]] = {
 
 FORMAT: Final = "driftwalk live"
 VERSION: Final = 1
-"""Of the stream; another version is refused."""
+"""Version of the stream; another version is refused."""
 LONGEST_LINE: Final = 1 << 25
 """Longest line [byte] that is read: a frame with a large image; chosen by hand."""
 FIRST_PAUSE_S: Final = 0.25

@@ -203,7 +203,7 @@ WINDOW: Final = 5
 """Fewest samples of a parabola, the nearest in time, so that gaps and uneven clocks are no case;
 chosen by hand."""
 WINDOW_S: Final = 0.16
-"""Time that a parabola covers [s]: five samples at 25 Hz. Of five samples of a faster camera the
+"""Time that a parabola covers [s]: five samples at 25 Hz. With five samples of a faster camera the
 turning rate is mostly noise of the angle: measured, with the angle as an input C_d came out 7 % too
 small at 50 Hz and 21 % at 100 Hz, in simulated recordings with 0.5 degrees of noise."""
 

@@ -34,7 +34,7 @@ DOUBLE_COLUMN_MM = 180.0
 MM_PER_INCH = 25.4
 """By definition of the inch."""
 BAR_WIDTH = 0.76
-"""Of the place of a bar: neighbours stay apart. Chosen by eye."""
+"""Part of its place that a bar takes, so that neighbours stay apart. Chosen by eye."""
 
 # Perceptually uniform, readable in grey and with every common colour vision deficiency.
 SCORE_COLORMAP = "viridis"

@@ -97,7 +97,7 @@ class Knob:
 
 
 SPEED: Final = Knob("speed", "speed", "×", 0.25, 60.0, 0.01, log=True)
-"""Of the tank's time over the reader's: from slow motion to a minute in a second."""
+"""The tank's time over the reader's: from slow motion to a minute in a second."""
 KNOBS: Final = (
     Knob("drag_coefficient", "drag coefficient C_d", "1", 0.0, 1.5, 0.01),
     Knob("force_std", "stochastic force σ_F", "N", 0.0, 1.5e-3, 1e-5),
