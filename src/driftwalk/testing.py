@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 WORLDS = 7
+"""Worlds of a test: no power of two, so that a remainder of vector lanes is met too."""
 
 
 class MotionModelContract:

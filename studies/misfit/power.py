@@ -24,12 +24,8 @@ import driftwalk as dw
 from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, write_manifest
 from driftwalk.likelihood.check.criteria import VERDICT
-from driftwalk.likelihood.law.forward_selection import (
-    MEMORY_SIGMAS,
-    OPENED_SIGMAS,
-    SELECTION,
-    least_effects,
-)
+from driftwalk.likelihood.law.forward_selection import least_effects
+from driftwalk.schema.answers.force_law import SELECTION
 
 Lines = Sequence[dict[str, Any]]
 
@@ -61,10 +57,10 @@ SHOWN: Final = {
 }
 """Words, factor and unit of the numbers of a fit."""
 SIGMAS: Final = {
-    "force_memory": MEMORY_SIGMAS,
+    "force_memory": SELECTION.memory_sigmas,
     "strength_1": math.sqrt(SELECTION.strength_chi_squared),
 }
-"""Standard deviations that open a number, where they are others than `OPENED_SIGMAS`."""
+"""Standard deviations that open a number, where they are others than `SELECTION.opened_sigmas`."""
 
 
 def main() -> None:
@@ -142,7 +138,9 @@ def limits_table(lines: Lines) -> str:
                 for one in lines
                 if one["minutes"] == minutes and name in one.get("departure_std", {})
             ]
-            size = np.array([_size(name, SIGMAS.get(name, OPENED_SIGMAS) * one) for one in std])
+            size = np.array(
+                [_size(name, SIGMAS.get(name, SELECTION.opened_sigmas) * one) for one in std]
+            )
             row.append(
                 f"{factor * np.median(size):.2g} ({factor * size.min():.2g} to "
                 f"{factor * size.max():.2g}) {unit}"

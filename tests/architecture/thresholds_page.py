@@ -1,21 +1,34 @@
-"""The page of tuned thresholds, made from the policy classes of the source.
+"""The page of tuned thresholds, made from the policy classes and constants of the source.
 
 ``python tests/architecture/thresholds_page.py`` writes its tables again. A policy is a
 `NamedTuple` whose name ends with "Policy"; each of its fields has a docstring that says what the
-threshold decides and how it was chosen.
+threshold decides and how it was chosen. A constant that decides alone needs no class. The numbers
+of the native core are a table that is written by hand; `core_thresholds` reads it.
 """
 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
+
+from reasons import numeric_constants
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 SOURCE: Final = ROOT / "src"
 PAGE: Final = ROOT / "docs" / "reference" / "thresholds.md"
 BEGIN: Final = "<!-- Made by `python tests/architecture/thresholds_page.py`. -->\n"
+CHOSEN: Final = re.compile(
+    r"studies/|docs/|\b[Bb]y (hand|eye|convention|definition)\b|[Mm]easured|[Cc]hance|false alarm"
+    r"|closed form"
+)
+"""Words of which every reason of a threshold has one: how it was chosen."""
+TUNED: Final = re.compile(r"studies/|docs/|\b[Bb]y hand\b|[Mm]easured|[Cc]hance|false alarm")
+"""The same of a constant that is no format, no layout and no law of nature."""
+LONGEST: Final = 60
+"""Characters of a value that the page shows."""
 
 
 class Threshold(NamedTuple):
@@ -66,22 +79,56 @@ def _written(node: ast.expr, lines: list[bytes]) -> str:
 
 
 def thresholds_page(page: str) -> str:
-    """Return the page with the tables of all policies below its mark."""
-    return page[: page.index(BEGIN)] + BEGIN + "".join(_table(one) for one in policies())
+    """Return the page with the tables of all policies, and of single constants, below its mark."""
+    tables = "".join(_table(one) for one in policies())
+    return page[: page.index(BEGIN)] + BEGIN + tables + _single()
+
+
+class CoreThreshold(NamedTuple):
+    """A row of the table of the native core."""
+
+    name: str
+    value: str
+    path: Path
+    reason: str
+
+
+def core_thresholds(page: str) -> list[CoreThreshold]:
+    """Return the rows of the hand-written table, above the mark."""
+    row = re.compile(r"^\| `(\w+)` \| ([^|]+?) \| `(\S+\.hpp)` \| (.+) \|$", re.MULTILINE)
+    return [
+        CoreThreshold(name, value, ROOT / "cpp" / "include" / "driftwalk" / path, reason)
+        for name, value, path, reason in row.findall(page[: page.index(BEGIN)])
+    ]
+
+
+def _single() -> str:
+    """Return the table of the constants outside of policies that say how they were chosen."""
+    rows = "".join(
+        f"| `{one.name}` | {one.value} | `{one.path}` | {_in_cell(one.reason)} |\n"
+        for one in numeric_constants()
+        if TUNED.search(one.reason) and len(one.value) <= LONGEST
+    )
+    return (
+        "\n## Numbers on their own\n\nEach is the only one of its decision.\n\n"
+        "| constant | value | in `src/driftwalk` | meaning, and how it was chosen |\n"
+        "|---|---|---|---|\n" + rows
+    )
 
 
 def _table(policy: Policy) -> str:
     room = policy.path.relative_to("src/driftwalk").parts[0]
-    head = f"\n## {room}: {policy.name}\n\n{policy.purpose} In `{policy.path.as_posix()}`.\n\n"
-    rows = (
-        f"| `{one.name}` | {one.value} | {one.reason.replace('|', chr(92) + '|')} |\n"
-        for one in policy.thresholds
+    rows = "".join(
+        f"| `{one.name}` | {one.value} | {_in_cell(one.reason)} |\n" for one in policy.thresholds
     )
     return (
-        head
-        + "| threshold | value | meaning, and how it was chosen |\n|---|---|---|\n"
-        + "".join(rows)
+        f"\n## {room}: {policy.name}\n\n{policy.purpose} In `{policy.path.as_posix()}`.\n\n"
+        "| threshold | value | meaning, and how it was chosen |\n|---|---|---|\n" + rows
     )
+
+
+def _in_cell(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 if __name__ == "__main__":

@@ -39,7 +39,8 @@ def compare_after_little(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(compare, "Budget", lambda: FEW)
     _approach_little(patch)
     _descend_little(patch)
-    patch.setattr(synthetic_likelihood, "SIMULATIONS", 256)
+    fewer = synthetic_likelihood.SYNTHETIC._replace(simulations=256)
+    patch.setattr(synthetic_likelihood, "SYNTHETIC", fewer)
 
 
 def _approach_little(patch: pytest.MonkeyPatch) -> None:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 
 UNKNOWN: Final = -1
+"""In place of the number of a class where the frame shows none."""
 
 
 def classify(

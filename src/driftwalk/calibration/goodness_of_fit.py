@@ -19,7 +19,7 @@ from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.progress import Progress
 from driftwalk.schema import Track
-from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR, is_explained
+from driftwalk.schema.answers.facts import GOODNESS, is_explained
 from driftwalk.simulation.series import flow_since
 
 
@@ -39,7 +39,7 @@ class GoodnessOfFit(NamedTuple):
     floor: float
     """Median KS distance between two simulated recordings of these parameters."""
     floor_upper: float
-    """Its 95 % quantile."""
+    """Its upper quantile (`GOODNESS.floor_quantile`)."""
 
     @property
     def stretch(self) -> float:
@@ -49,7 +49,7 @@ class GoodnessOfFit(NamedTuple):
     @property
     def explained(self) -> bool:
         """Whether the distance is within reach of the floor."""
-        return is_explained(self.distance, self.floor, self.floor_upper, FAR_ABOVE_FLOOR)
+        return is_explained(self.distance, self.floor, self.floor_upper, GOODNESS.far_above_floor)
 
 
 def goodness_of_fit(bootstrap: Bootstrap) -> GoodnessOfFit:
@@ -59,7 +59,7 @@ def goodness_of_fit(bootstrap: Bootstrap) -> GoodnessOfFit:
         float(to_recording.mean()),
         float(to_recording.std(ddof=1) / np.sqrt(to_recording.size)),
         float(np.median(bootstrap.to_each_other)),
-        float(np.quantile(bootstrap.to_each_other, 0.95)),
+        float(np.quantile(bootstrap.to_each_other, GOODNESS.floor_quantile)),
     )
 
 

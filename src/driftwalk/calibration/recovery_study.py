@@ -131,7 +131,7 @@ class EstimationMethod(ABC, Generic[RecordingT]):
 
 
 COVERAGE_CONFIDENCE: Final = 0.95
-"""Confidence of the Clopper-Pearson interval of a coverage."""
+"""Confidence of the Clopper-Pearson interval of a coverage; by convention."""
 
 
 class Summary(NamedTuple):

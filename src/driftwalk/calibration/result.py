@@ -22,7 +22,7 @@ from driftwalk.comparison.statistic import BINS, joint_density
 from driftwalk.core.arrays import Floats
 from driftwalk.motion.score import broken_worlds, excerpt_samples
 from driftwalk.schema import Parameter
-from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR, calibration_parts
+from driftwalk.schema.answers.facts import GOODNESS, calibration_parts
 from driftwalk.schema.answers.verdict import verdict_variables
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.kinds.calibration import CELL_STATUS
@@ -117,7 +117,7 @@ def _facts(
             "ks_distance_standard_error": quality.standard_error,
             "noise_floor_upper": quality.floor_upper,
             "distance_to_floor_ratio": quality.distance / quality.floor,
-            "far_above_floor": FAR_ABOVE_FLOOR,
+            "far_above_floor": GOODNESS.far_above_floor,
             "region_level": region.level,
             "interval_stretch": quality.stretch,
         }

@@ -29,9 +29,9 @@ class WallWarningPolicy(NamedTuple):
     """When a recording is near a wall often enough for its friction to count. Chosen by hand."""
 
     notable_share: float = 0.05
-    """Share of the samples near the wall above which a warning is given."""
+    """Share of the samples near the wall above which a warning is given; chosen by hand."""
     reach_m: float = 0.002
-    """How far a block may move from one sample to the next [m]."""
+    """How far a block may move from one sample to the next [m]; chosen by hand."""
 
 
 WALL_WARNING: Final = WallWarningPolicy()
@@ -124,8 +124,8 @@ def interval_warnings(
         axis = window[index]
         step = float(np.diff(axis).min()) if axis.size > 1 else steps[index]
         for side in (0, -1):
-            # The bootstrap's own 5 % tail may lie there; more means that the grid cuts it off.
-            crowded = np.mean(_close(estimates[:, index], lattice[index][side], step)) > 0.05
+            at_end = np.mean(_close(estimates[:, index], lattice[index][side], step))
+            crowded = at_end > MISFIT.most_at_end
             cut = _close(intervals[index][side], axis[side], step)
             region_cut = bool(_close(border[:, index], axis[side], step).any())
             reaches = f"the interval of the {parameter.label} reaches the end of the"
@@ -175,6 +175,9 @@ class MisfitPolicy(NamedTuple):
     least_share: float = 0.01
     """Half an interval over the search, below which a parameter near 0 is determined. Chosen by
     hand."""
+    most_at_end: float = 0.05
+    """Share of the bootstrap's estimates at an end of a grid above which the grid cuts them off: of
+    a whole 90 % interval chance puts as many beyond each end."""
 
 
 MISFIT: Final = MisfitPolicy()

@@ -77,6 +77,7 @@ def compare_models(
     chosen = models_knowing(named, known)
     read, begun = read_for_models(recording, flow, given, how, chosen)
     with options.reported("compare models") as told:
+        # A reader sees the ranking grow, model by model; a program takes the whole result.
         if not options.json:
             read["finished"] = Ranking(told["progress"])
         work = ModelComparisonWork(**read, models=chosen, threads=options.threads)

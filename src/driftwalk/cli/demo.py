@@ -248,7 +248,6 @@ def _print_estimates(method: str, found: xr.Dataset) -> None:
 
 
 def _print_row(name: str, *cells: str) -> None:
-    """Print a row of the table."""
     widths = (9, 0)
     line = "".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=True))
     print(f"{name:27}{line}".rstrip())

@@ -64,6 +64,7 @@ def export(
     use them and what they do not hold. Nothing is overwritten.
     """
     target = target_named(to)
+    # Before the files are written: what cannot be verified is refused, and nothing is left behind.
     if verify:
         if target.verify is None:
             raise InputError(f"--verify: an export to {to} is no simulation to compare with")

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from driftwalk.viewer import Source
 
 FLOW_SEED = 1
+"""Seed of the random flow where none is given: the playground is the same each time."""
 BLOCKS = 4
+"""Blocks where the study states no number: as many as in a study file that says nothing."""
 
 
 @with_study_options(
@@ -70,6 +72,7 @@ def play(
     """
     from driftwalk.viewer import PlaySource, hello_line, require_server, save_playground
 
+    # Before anything is read: without its extra there is no server to show it.
     if save is None:
         require_server()
     elif live is not None:
@@ -106,6 +109,7 @@ def play(
         path = save_playground(tank, save, existing="replace" if overwrite else "error")
         print_note(f"the playground: {path}, {path.stat().st_size / 1e6:.1f} MB")
         return
+    # The stream ends with the page, also where that ends by Ctrl-C.
     with contextlib.ExitStack() as open_things:
         if live is not None:
             from driftwalk.track import LiveServer

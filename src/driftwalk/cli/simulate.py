@@ -101,6 +101,7 @@ def simulate(
         raise InputError(f"--backend takes cpu or reference, got '{backend}'")
     if like is not None and backend == "reference":
         raise InputError("--like runs on the cpu backend only: leave out --backend")
+    # Before the simulation: minutes of work must not end at a file that stands in the way.
     require_place(out, existing="replace" if overwrite else "error")
     others = feels_others(model)
     kept = None if others else body

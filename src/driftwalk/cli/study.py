@@ -175,6 +175,7 @@ def recover(
     method: FitRecovery | ModelRecovery
     if not source.is_block:
         _refuse(given, OF_THE_BLOCK, "about the block, which --model replaces; leave it out")
+        # The noise is no parameter of a model, but the recovery may be told it all the same.
         of_model = [name for name in known or () if name != NOISE]
         chosen = partly_known_model(model, parameters, run, of_model)
         noise: Noise = "known" if NOISE in (known or ()) else "estimated"

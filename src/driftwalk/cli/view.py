@@ -21,7 +21,6 @@ Host = Annotated[
 Open = Annotated[
     bool | None, option("--open/--no-open", "Open the browser (default: only on a terminal).")
 ]
-LAST_PORT = 65535
 
 
 def view(
@@ -97,6 +96,7 @@ def address_of(text: str) -> tuple[str, int] | None:
     name, _, port = text.rpartition(":")
     if not (port.isascii() and port.isdigit()):
         return None
-    if not 0 < int(port) <= LAST_PORT:
+    # A port has 16 bits.
+    if not 0 < int(port) < 1 << 16:
         raise InputError(f"{text}: expected an address and a port, such as 127.0.0.1:5000")
     return name.strip("[]") or "127.0.0.1", int(port)

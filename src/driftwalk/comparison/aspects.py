@@ -32,17 +32,21 @@ from driftwalk.core.processors import map_in_threads
 
 
 class AspectPolicy(NamedTuple):
-    """Which further steps the aspects of a motion compare."""
+    """Which further steps the aspects of a motion compare, and how far chance takes them apart."""
 
     longer: tuple[int, ...] = (3, 9)
     """Longer steps, in step intervals; chosen by hand."""
     later: int = 3
     """Step intervals between the two steps whose lengths are compared; chosen by hand."""
+    fewest_points: int = 30
+    """Points without which an aspect is left out, as pairs of steps; chosen by hand."""
+    blocks: int = 20
+    """Blocks of time into which a recording is cut; an even number, chosen by hand."""
+    halvings: int = 16
+    """Random halves of the blocks from which the floor is taken; chosen by hand."""
 
 
 ASPECT_POLICY: Final = AspectPolicy()
-
-FEWEST_POINTS: Final = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +103,7 @@ def plan_aspects(time: npt.ArrayLike, *, step_interval: float | None = None) -> 
             plan = plan_steps(stamps, step_interval=factor * short.step_interval)
         except InputError:
             continue
-        if plan.pairs >= FEWEST_POINTS:
+        if plan.pairs >= ASPECT_POLICY.fewest_points:
             longer.append(plan)
     # A step is there where it is the first or the second one of a pair.
     follows = np.zeros(short.points, dtype=bool)
@@ -223,12 +227,6 @@ def _aspect(name: str, first: Floats, second: Floats, time: Floats) -> Aspect:
     return Aspect(name, np.ascontiguousarray(points), time[sound])
 
 
-BLOCKS: Final = 20
-"""Blocks of time into which a recording is cut."""
-HALVINGS: Final = 16
-"""Random halves of the blocks from which the floor is taken."""
-
-
 @dataclass(frozen=True, eq=False)
 class AspectReference:
     """The aspects of a recording, ready for comparison.
@@ -303,14 +301,15 @@ def aspect_reference(
     >>> float(reference.distances([aspects]).max())
     0.0
     """
-    kept = [one for one in aspects if len(one.points) >= FEWEST_POINTS]
+    kept = [one for one in aspects if len(one.points) >= ASPECT_POLICY.fewest_points]
     if not kept:
         raise InputError(
-            f"no aspect of the motion has {FEWEST_POINTS} points: the recording hardly moves, or "
-            "is too short for the step interval (`step_interval`)"
+            f"no aspect of the motion has {ASPECT_POLICY.fewest_points} points: the recording "
+            "hardly moves, or is too short for the step interval (`step_interval`)"
         )
     random = np.random.default_rng(seed)
-    halves = [random.permutation(BLOCKS) < BLOCKS // 2 for _ in range(HALVINGS)]
+    blocks = ASPECT_POLICY.blocks
+    halves = [random.permutation(blocks) < blocks // 2 for _ in range(ASPECT_POLICY.halvings)]
     floor = [_between_halves(one, duration, halves, over=np.sqrt(2.0)) for one in kept]
     references = tuple(KsReference(one.points) for one in kept)
     return AspectReference(tuple(one.name for one in kept), np.array(floor), references)
@@ -325,7 +324,7 @@ def block_of(time: npt.ArrayLike, duration: float) -> Integers:
     [0, 0, 1, 19]
     """
     share = np.asarray(time, dtype=np.float64) / duration
-    return np.clip((share * BLOCKS).astype(np.int64), 0, BLOCKS - 1)
+    return np.clip((share * ASPECT_POLICY.blocks).astype(np.int64), 0, ASPECT_POLICY.blocks - 1)
 
 
 def interleaved(aspects: Sequence[Aspect], *, duration: float) -> tuple[list[Aspect], list[Aspect]]:
@@ -361,8 +360,9 @@ def own_distance(aspect: Aspect, *, duration: float, seed: int = 0) -> float:
         Seed of the choices.
     """
     random = np.random.default_rng(seed)
-    first = random.integers(0, 2, size=(HALVINGS, BLOCKS // 2))
-    halves = np.stack([first == 0, first == 1], axis=2).reshape(HALVINGS, BLOCKS)
+    halvings, blocks = ASPECT_POLICY.halvings, ASPECT_POLICY.blocks
+    first = random.integers(0, 2, size=(halvings, blocks // 2))
+    halves = np.stack([first == 0, first == 1], axis=2).reshape(halvings, blocks)
     return _between_halves(aspect, duration, list(halves))
 
 

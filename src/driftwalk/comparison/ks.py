@@ -259,15 +259,21 @@ def _compare_once(
     return _comparison(found, ties, combine, counts_ties)
 
 
-MANY_TIED: Final = 20
-"""One point in so many may be tied before a warning: 5 %, chosen by hand."""
+class TiePolicy(NamedTuple):
+    """How many points may be tied."""
+
+    one_in: int = 20
+    """One point in so many may be tied before a warning: 5 %; chosen by hand."""
+
+
+TIED: Final = TiePolicy()
 
 
 def _most_tied(points: int, ties: Ties, counts_ties: bool) -> int:
     """Return how many tied points to count: all, or those that decide on a warning."""
     if counts_ties:
         return points
-    return points // MANY_TIED if ties == "strict" else 0
+    return points // TIED.one_in if ties == "strict" else 0
 
 
 def checked_points(points: npt.ArrayLike, name: str) -> Points:
@@ -300,8 +306,8 @@ def _comparison(
     d1, d2, n1, n2, tied, place1, place2 = raw
     product = n1 * n2
     tied_fraction = tied / (n1 + n2)
-    if ties == "strict" and tied * MANY_TIED > n1 + n2:
-        share = f"{100 * tied_fraction:.0f}" if counts_ties else f"more than {100 // MANY_TIED}"
+    if ties == "strict" and tied * TIED.one_in > n1 + n2:
+        share = f"{100 * tied_fraction:.0f}" if counts_ties else f"more than {100 // TIED.one_in}"
         warnings.warn(
             f"{share} % of the points share a coordinate with another point, "
             'and open quadrants leave such points out: consider ties="limits"',

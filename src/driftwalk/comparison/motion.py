@@ -83,6 +83,7 @@ def compare(
     trajectories = ((trajectory_a, body_a), (trajectory_b, body_b))
     interval = step_interval
     if interval is None:
+        # Steps of both have to last as long, and those of the slower recording cannot be shorter.
         interval = max(sampling_interval(dataset, body) for dataset, body in trajectories)
     walks = [steps(dataset, body=body, step_interval=interval) for dataset, body in trajectories]
     points = [_points(walk) for walk in walks]
@@ -140,6 +141,7 @@ def _dataset(
 ) -> xr.Dataset:
     lengths = [walk["step_length"].values for walk in walks]
     angles = [walk["turning_angle"].values for walk in walks]
+    # Edges of both together: their densities are compared bin by bin.
     length_edge, angle_edge = step_length_edges(*lengths), turning_angle_edges()
     density = [
         joint_density(length, angle, step_length_edge=length_edge, turning_angle_edge=angle_edge)

@@ -156,6 +156,7 @@ def plan_steps(
     multiple = max(1, round(wanted / sampling))
     divides = abs(multiple * sampling - wanted) <= tolerance * wanted * (1 + ROUNDING)
     irregular = int((~within).sum())
+    # Positions as they were measured wherever possible: interpolation smooths part of the noise.
     if divides and irregular <= STEP_PLAN.irregular_fraction * intervals.size:
         mode: Mode = "exact"
         left, triple = _decimate(stamps, within, multiple, wanted, tolerance)

@@ -24,13 +24,14 @@ class AutocorrelationPolicy(NamedTuple):
     """How far an autocorrelation is summed, and when it counts."""
 
     window: float = 2.5
-    """Largest lag, in autocorrelation times: five times 1/2 + sum of rho, the rule of Sokal."""
+    """Largest lag, in autocorrelation times: five times 1/2 + sum of rho, the rule of Sokal, by
+    convention."""
     fewest: int = 4
     """Values without which there is no correlation, and one more than the last lag that tells
     how much of a series is correlated; chosen by hand."""
     significant: float = 3.0
-    """Standard errors of white noise from which on a correlation is significant: 0.3 % of white
-    series."""
+    """Standard errors of white noise from which on a correlation is significant: chance exceeds it
+    in 0.3 % of white series."""
 
 
 _AUTOCORRELATION: Final = AutocorrelationPolicy()
@@ -132,7 +133,7 @@ class PermutationPolicy(NamedTuple):
     """Length of a block, in autocorrelation times: with shorter ones the test rejects too
     often; chosen by hand."""
     fewest_arrangements: int = 20
-    """Ways to exchange the blocks without which no p-value can reach 5 %."""
+    """Ways to exchange the blocks without which no p-value can reach 5 %; in closed form."""
     labels_at_once: int = 1 << 24
     """Labels of blocks that are held at once; chosen by hand."""
 

@@ -28,8 +28,8 @@ class CameraPolicy(NamedTuple):
     clear: float = 2.0
     """Standard errors by which an estimated noise must be above zero; chosen by hand."""
     deviations: tuple[float, ...] = (-0.3775, 1.3630, -1.3630, 0.3775)
-    """Noises that are simulated, in standard errors: middles of four equal parts of a normal
-    distribution, scaled to variance 1, neighbours far apart."""
+    """Noises that are simulated, in standard errors: in closed form the middles of four equal parts
+    of a normal distribution, scaled to variance 1, neighbours far apart."""
 
 
 _CAMERA: Final = CameraPolicy()

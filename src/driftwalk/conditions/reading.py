@@ -100,7 +100,8 @@ def read_recordings(
 
 
 MOST_BODIES: Final = 8
-"""Most bodies whose forces are compared: the work grows with the third power of their number."""
+"""Most bodies whose forces are compared: the work grows with the third power of their number;
+chosen by hand."""
 
 
 def one_body_each(recordings: Sequence[xr.Dataset], study: Study) -> list[xr.Dataset]:

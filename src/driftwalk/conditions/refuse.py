@@ -28,7 +28,7 @@ class MotionPolicy(NamedTuple):
     """Which recordings show a motion."""
 
     fewest_positions: int = 3
-    """Positions of two steps, which have one turning angle."""
+    """Positions of two steps, which have one turning angle; by definition."""
     least_motion: float = 0.1
     """Range of the positions, in sides of the block, below which it is at rest; chosen by hand."""
     least_motion_in_noises: float = 3.0

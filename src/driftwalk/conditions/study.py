@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -26,9 +26,17 @@ if TYPE_CHECKING:
 
 OUTLINE: Final = ("shape", "diameter_m", "width_m", "height_m", "vertices_m")
 """Keys of a tank that state its outline; the others are about its wall."""
-MOST_OUTSIDE = 0.01
-"""Share of positions outside the tank, farther than noise takes them, from which on the tank cannot
-be right."""
+
+
+class TankPolicy(NamedTuple):
+    """When a stated tank cannot be that of a recording."""
+
+    most_outside: float = 0.01
+    """Share of positions outside the tank, farther than noise takes them, from which on the tank
+    cannot be right; chosen by hand."""
+
+
+TANK: Final = TankPolicy()
 
 
 def study_in_arena(study: Study, recording: xr.Dataset) -> Study:
@@ -96,14 +104,14 @@ def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> Non
     track = body_track(recording, body)
     outline = outline_of(tank.to_arena())
     beyond = -outline.depth(track.x, track.y)
-    if np.mean(beyond > 0.0) <= MOST_OUTSIDE:
+    if np.mean(beyond > 0.0) <= TANK.most_outside:
         return
     x_min, y_min, x_max, y_max = outline.bounds
     stated = study.observation.position_noise_m
     noise = None if isinstance(stated, str) else stated
     reach = noise_reach(track, noise, size=min(x_max - x_min, y_max - y_min))
     share = float(np.mean(beyond > reach))
-    if share > MOST_OUTSIDE:
+    if share > TANK.most_outside:
         raise InputError(
             f"{in_percent(share)} of the positions lie outside the tank, a {tank.describe()} "
             f"about the origin, farther than noise takes them ({1e3 * reach:.2g} mm): the "

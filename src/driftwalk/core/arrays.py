@@ -26,7 +26,7 @@ Keys = npt.NDArray[np.uint64]
 
 
 MOST_REMEMBERED: Final = 16
-"""Results of a function that are kept."""
+"""Results of a function that are kept; chosen by hand."""
 
 P = ParamSpec("P")
 T = TypeVar("T")

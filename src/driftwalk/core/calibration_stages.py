@@ -40,7 +40,7 @@ CALIBRATION_STAGES: Final[dict[str, Stage]] = {
 MORE: Final = "more-"
 """Stands before the name of a map where some of its settings are simulated again."""
 ONCE: Final = 0.9
-"""Share of a map's time until every setting has been simulated once."""
+"""Share of a map's time until every setting has been simulated once; chosen by hand."""
 
 
 def share_of_map(done: Iterable[float]) -> float:

@@ -12,6 +12,7 @@ from typing import Any, Final, cast
 from driftwalk.core.errors import FormatError, InputError
 
 _STDERR: Final = 2
+"""File descriptor of standard error, by POSIX: libraries in C write to it past `sys.stderr`."""
 _DASK: Final = "dask"
 
 

@@ -11,7 +11,7 @@ from typing import Final
 from driftwalk.core.errors import ConfigurationError
 
 MOST_SETTINGS: Final = 1_000_000
-"""Values that an axis of a grid, and a grid, may have."""
+"""Values that an axis of a grid, and a grid, may have; chosen by hand."""
 
 
 def check_axis(name: str, low: float, high: float, step: float) -> None:

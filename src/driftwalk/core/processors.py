@@ -17,6 +17,7 @@ FoundT = TypeVar("FoundT")
 
 _lock = Lock()
 _callers = 0
+"""Calls under way that need one thread of BLAS; the last one lifts the limit."""
 _limits: Any = None
 
 

@@ -17,6 +17,7 @@ from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.text_files import read_json, text_of_name
 
 MANIFEST_VERSION: Final = 1
+"""Raised when a reader of the last version would misread a manifest."""
 MANIFEST_KIND: Final = "driftwalk manifest"
 # Packages that the numbers or the files may depend on.
 _PACKAGES: Final = ("numpy", "scipy", "xarray", "h5netcdf", "h5py", "pandas", "matplotlib")

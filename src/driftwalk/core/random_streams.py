@@ -118,6 +118,7 @@ def trial_in(work: str, index: npt.ArrayLike) -> Keys:
 
 
 _GAMMA = np.uint64(0x9E3779B97F4A7C15)
+"""Increment of SplitMix64, 2^64 over the golden ratio (Steele, Lea and Flood 2014)."""
 
 
 def world_keys(seed: int, *, trial: npt.ArrayLike, replicate: npt.ArrayLike) -> Keys:

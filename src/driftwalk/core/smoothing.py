@@ -15,15 +15,18 @@ from driftwalk.core.arrays import Bools, Floats, Indices
 from driftwalk.core.errors import InputError
 
 MIN_SAMPLES = 5
-"""Samples that a window needs: a parabola through three has no residual to average."""
+"""Samples that a window needs: a parabola through three has no residual to average; chosen by
+hand."""
 _EDGE = 1e-3
-"""A sample on the edge of the window, up to this part of the interval, is in it."""
+"""A sample on the edge of the window, up to this part of the interval, is in it; chosen by hand."""
 _EVEN = 1e-6
-"""Intervals that differ from the median by less than this part of it count as equal."""
+"""Intervals that differ from the median by less than this part of it count as equal; chosen by
+hand."""
 _SINGULAR = 1e-10
-"""Below this part of its size the quadratic term is not determined by the sampling times."""
+"""Below this part of its size the quadratic term is not determined by the sampling times; chosen by
+hand."""
 _CHUNK = 1 << 15
-"""Windows fitted at a time: a handful of such arrays stay in the cache."""
+"""Windows fitted at a time: a handful of such arrays stay in the cache; chosen by hand."""
 
 
 def local_quadratic(

@@ -18,6 +18,7 @@ from typing import Any, Final
 from driftwalk.core.errors import FormatError
 
 MIB: Final = 1 << 20
+"""Bytes of a mebibyte."""
 
 
 def read_bounded(path: str | Path, *, most: int) -> bytes:
@@ -98,7 +99,7 @@ def path_inside(folder: Path, name: str) -> Path | None:
 
 
 MOST_JSON_BYTES: Final = 64 * MIB
-"""Largest JSON file: some 3 million points, or any manifest."""
+"""Largest JSON file: some 3 million points, or any manifest; chosen by hand."""
 _INTEGER_DIGITS: Final = 20
 """Characters of the longest integer of 64 bits."""
 
@@ -199,6 +200,7 @@ def _integer(digits: str) -> int | float:
 
 
 MOST_LEVELS: Final = 64
+"""Depth of nested values: far below the depth at which Python's own recursion ends (1000)."""
 
 
 def refuse_deep(values: Any, *, path: str | Path | None = None) -> None:
@@ -236,7 +238,7 @@ _TWICE: Final = re.compile(
 """Message of the reader about a table, or a key, that stands twice."""
 MOST_PARTS: Final = 100
 """Parts of a key, as of a.b.c; its reader takes memory that grows with the square of their number:
-50,000 took 4 GB. Keys of such a file have two."""
+50,000 took 4 GB. Keys of such a file have two; chosen by hand."""
 _LONG_KEY: Final = re.compile(
     r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){""" + f"{MOST_PARTS}}}"
 )

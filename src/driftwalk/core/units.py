@@ -26,6 +26,7 @@ class _Unit(NamedTuple):
 
 
 _NONE: Final[Dimension] = (0, 0, 0, 0)
+"""Dimension of a bare number."""
 # Symbols that take SI prefixes. The gram is here, and not the kilogram, because "kg" is k + g.
 _PREFIXABLE: Final[dict[str, _Unit]] = {
     "m": _Unit(Fraction(1), (1, 0, 0, 0)),
@@ -38,6 +39,7 @@ _PREFIXABLE: Final[dict[str, _Unit]] = {
     "J": _Unit(Fraction(1), (2, 1, -2, 0)),
 }
 _DEGREE: Final = Fraction(math.pi) / 180
+"""Radians of a degree."""
 _FIXED: Final[dict[str, _Unit]] = {
     "1": _Unit(Fraction(1), _NONE),
     "min": _Unit(Fraction(60), (0, 0, 1, 0)),
@@ -45,6 +47,7 @@ _FIXED: Final[dict[str, _Unit]] = {
     "deg": _Unit(_DEGREE, (0, 0, 0, 1)),
     "°": _Unit(_DEGREE, (0, 0, 0, 1)),
 }
+"""Symbols that take no prefix."""
 # Both code points of mu are in use: the micro sign of keyboards and the Greek letter.
 _PREFIXES: Final[dict[str, Fraction]] = {
     symbol: Fraction(10) ** power
@@ -58,6 +61,7 @@ _FACTOR: Final = re.compile(
     r"\s*([*·/]?)\s*([A-Za-zµμ]+|°|1)\s*(?:(?:\^|\*\*)?(-?\d+)|([²³]))?", re.ASCII
 )
 _SUPERSCRIPTS: Final = {"²": 2, "³": 3}
+"""Powers as they are typed in one character."""
 RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 """From signs and digits to those of a power."""
 

@@ -38,11 +38,16 @@ if TYPE_CHECKING:
 Image = npt.NDArray[np.uint8]
 
 _FINE: Final = 3
-"""Points along each side of a pixel at which coverage is found."""
+"""Points along each side of a pixel at which coverage is found; chosen by hand."""
 _STEP_PX: Final = 0.4
+"""Way of a block between two exposures of a frame [px]: below the blur of an edge; chosen by
+hand."""
 _MOST_EXPOSURES: Final = 16
+"""Exposures of a frame at most, a bound on the time; chosen by hand."""
 _NOISE_FRAMES: Final = 4
+"""Frames of noise that are drawn; each frame begins at another place of it. Chosen by hand."""
 _BAR: Final[Colour] = (44, 40, 40)
+"""Colour of a bar that hides blocks, a dark grey (blue, green, red)."""
 
 
 def render_video(

@@ -213,6 +213,7 @@ def video_settings(level: str = "moderate", **changes: Any) -> VideoSettings:
 
 
 _NEWTON_STEPS = 8
+"""Steps of Newton's method that undo the lens; it squares the error at each."""
 
 
 def world_to_image(settings: VideoSettings, points: Floats) -> Floats:
@@ -260,13 +261,18 @@ def local_scale(settings: VideoSettings, point: Floats) -> float:
 
 
 _WAVES = 48
+"""Plane waves of the field of glare: enough for a sum that is nearly Gaussian; chosen by hand."""
 _COARSE = 4
+"""Pixels between places where glare is computed: patches are smooth. Chosen by hand."""
 # For a Gaussian field of wave number k, cut where 5 % of the area is above, a patch has the area
 # of a circle of this radius times 1/k.
 _RADIUS_TIMES_WAVE_NUMBER = 1.085
 _GLARE_RATE = 1.5
+"""Standard deviation of the waves' frequencies [rad/s]: a patch lives about a second; by hand."""
 _GLARE_EDGE = 0.08
+"""Softness of a patch's edge, in standard deviations of the field; chosen by hand."""
 _RIPPLE_RATE = 6.0
+"""Frequency of the ripples [rad/s], about one a second; chosen by hand."""
 
 
 class Glare:
@@ -329,6 +335,7 @@ def ripples(settings: VideoSettings, world: Singles, time: float) -> Singles:
 
 
 _OFFSETS = 512
+"""Places that are tried for a bar: it hides the stated share to a few thousandths. By hand."""
 
 
 @dataclass(frozen=True)

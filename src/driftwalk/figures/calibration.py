@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Length of the sample of the path that is drawn [s].
+# Length of the sample of the path that is drawn [s]; chosen by hand.
 EXCERPT_S = 60.0
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -154,6 +154,19 @@ def measured_share(flag: npt.NDArray[np.int8]) -> float:
     return float(np.count_nonzero(flag == FLAGS["measured"]) / in_tank)
 
 
+class CoveragePolicy(NamedTuple):
+    """When a measured field covers too little of the tank."""
+
+    least_share: float = 0.25
+    """Share of measured cells below which the field is mostly a guess; chosen by hand."""
+    most_beyond: float = 0.01
+    """Samples beyond the wall, in those within, above which scale or arena are in doubt; chosen by
+    hand."""
+
+
+COVERAGE: Final = CoveragePolicy()
+
+
 def coverage_warnings(
     share: float, *, used: int, beyond: int, cells: str = "the tank's cells"
 ) -> list[str]:
@@ -174,13 +187,12 @@ def coverage_warnings(
     []
     """
     sentences = []
-    # With fewer measured cells the field is mostly a guess; chosen by hand.
-    if share < 0.25:
+    if share < COVERAGE.least_share:
         sentences.append(
             f"Only {100.0 * share:.0f} % of {cells} are measured, the others are filled "
             "in: record for longer, or use larger cells."
         )
-    if beyond > math.ceil(0.01 * used):
+    if beyond > math.ceil(COVERAGE.most_beyond * used):
         sentences.append(
             f"{beyond} of {used + beyond} samples lie beyond the wall of the tank and were left "
             "out: check the scale, the origin and the arena."
@@ -240,7 +252,7 @@ def field_of_cells(
 
 
 _MAX_ITERATIONS = 20_000
-"""Ten times what an 800 x 800 grid with one known cell in 2000 needs."""
+"""Measured: ten times what an 800 x 800 grid with one known cell in 2000 needs."""
 
 
 def fill_velocity(

@@ -146,6 +146,8 @@ def extract_flow(
         settings.update({units.get(name, name): value for name, value in physics.items()})
     bodies = _chosen_bodies(trajectory, body)
     smoothed = _smooth(trajectory, bodies, window, grid)
+    # Smoothed before cells are formed: samples beyond the wall help the derivatives of those
+    # within.
     inside = _inside(smoothed, outline)
     means = average_cells(inside, cells=grid.size, pause=window, correction=correction)
     measured = means.count.reshape(grid.shape) >= min_count

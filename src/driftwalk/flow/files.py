@@ -128,6 +128,7 @@ def load_flow(
         {"tab": "\t", "space": " "}.get(delimiter or "", delimiter),
     )
     try:
+        # PIVlab saves MATLAB files in HDF5, which looks like NetCDF.
         if not is_netcdf(source) or is_pivlab(source):
             return _from_rows(source, options, said, arena=arena, attrs=attrs)
         if said != TextOptions():

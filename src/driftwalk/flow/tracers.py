@@ -107,7 +107,7 @@ def track_steps(trajectory: xr.Dataset) -> FoundSteps:
             "Name the column of the identities with `columns`"
         )
     interval = np.diff(time)[first]
-    near = interval <= 1.5 * float(np.median(interval))
+    near = interval <= _TRACERS.across * float(np.median(interval))
     sure = np.ones(first.size, dtype=bool)
     if "ambiguous" in trajectory:
         unsure = (trajectory["ambiguous"].values.T > 0.0)[body, row]
@@ -156,8 +156,7 @@ def step_noise(steps: Steps) -> float:
     if steps.time.size < 4:
         return math.nan
     in_a_row = np.lib.stride_tricks.sliding_window_view(steps.goes_on, 3).all(axis=1)
-    # With fewer fourth differences the noise is not known.
-    if np.count_nonzero(in_a_row) < 50:
+    if np.count_nonzero(in_a_row) < _TRACERS.fewest_in_a_row:
         return math.nan
     window = np.flatnonzero(in_a_row)[:, None] + np.arange(4)
     interval = steps.interval[window]
@@ -179,12 +178,13 @@ class LinkPolicy(NamedTuple):
     """Which steps are false links."""
 
     threshold: float = 4.0
-    """Normalised deviation of a false link. With 16 neighbours, 0.2 % of steps that scatter as
-    a Gaussian around the same velocity reach it."""
+    """Normalised deviation of a false link. Chance: with 16 neighbours, 0.2 % of steps that scatter
+    as a Gaussian around the same velocity reach it."""
     neighbours: int = 16
     """Steps of other tracks with which a step is compared; chosen by hand."""
     fewest: int = 8
-    """Neighbours without which a step is not judged: as a vector on a grid of PIV has."""
+    """Neighbours without which a step is not judged: by convention as many as a vector on a grid of
+    PIV has."""
     searched: tuple[int, ...] = (32, 128)
     """Nearest steps among which those of other tracks are looked for: few, then more; chosen by
     hand."""
@@ -192,7 +192,7 @@ class LinkPolicy(NamedTuple):
 
 LINKS: Final = LinkPolicy()
 _CHUNK: Final = 1 << 14
-"""Steps whose neighbours are looked up at once: some 40 MB."""
+"""Steps whose neighbours are looked up at once: some 40 MB; chosen by hand."""
 
 
 class Judged(NamedTuple):
@@ -312,6 +312,10 @@ class TracerPolicy(NamedTuple):
     """Share of false links above which the linking as a whole is in doubt; chosen by hand."""
     long_step: float = 1.0
     """Median step, in cells, above which the steps blur the field; chosen by hand."""
+    across: float = 1.5
+    """Usual intervals beyond which a step is one across a gap; chosen by hand."""
+    fewest_in_a_row: int = 50
+    """Fourth differences without which the noise of positions is not known; chosen by hand."""
 
 
 _TRACERS: Final = TracerPolicy()
@@ -393,6 +397,8 @@ def flow_from_tracers(
     if inside.time.size == 0:
         raise InputError(_none_inside(steps))
     noise = _noise(trajectory, steps) if position_noise is None else position_noise
+    # Beyond the wall there is no flow to agree with: such steps would count as neighbours of true
+    # ones.
     judged = judge_steps(inside, noise=noise)
     false = judged.is_false(outlier_threshold)
     kept = inside.select(~false)

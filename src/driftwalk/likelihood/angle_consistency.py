@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 LEFT_OUT_NATS = 18.0
-"""Least loss of log likelihood by a sample that the filter leaves out, as it is 6 standard
-deviations from its prediction: so a fit cannot gain by leaving samples out."""
+"""Least loss of log likelihood by a sample that the filter leaves out, in closed form, as it is 6
+standard deviations from its prediction: so a fit cannot gain by leaving samples out."""
 
 
 def angle_given_facts(

@@ -21,16 +21,18 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FRAMES_PER_PERIOD: Final = 32
-"""Frames of a flow with modes; linear between them, an amplitude comes out 0.2 % too small."""
+"""Frames of a flow with modes; linear between them, an amplitude comes out 0.2 % too small in
+closed form."""
 
 
 class FramePolicy(NamedTuple):
     """Frames of a flow whose strength changes; between them it is linear in time."""
 
     per_half_wave: int = 10
-    """Frames in half a wave of the fastest cosine: its amplitude comes out 1 % too small."""
+    """Frames in half a wave of the fastest cosine: its amplitude comes out 1 % too small in closed
+    form."""
     per_period: int = 16
-    """Frames in a period of a pulse: its amplitude comes out 1 % too small."""
+    """Frames in a period of a pulse: its amplitude comes out 1 % too small in closed form."""
     most: int = 2000
     """Most frames: with the 50 by 50 nodes of a flow they take some 100 MB. Chosen by hand."""
 

@@ -34,7 +34,7 @@ class InflationPolicy(NamedTuple):
     a coverage of 90 % on 64 recordings (studies/likelihood, sets synthetic and ode)."""
     without_angle: tuple[float, ...] = (1.4, 1.4, 1.1)
     """Of ln C_d, ln q and ln r with the angle as an input or not used. Calibrated in the same way
-    on 32 recordings."""
+    on 32 recordings (studies/likelihood)."""
     number: float = 1.3
     """Of the numbers of departures. Chosen by hand, as the factor of ln C_d."""
     most_factor: float = 10.0
@@ -128,6 +128,7 @@ def parameter_facts(
     )
     total = heavier.share**2 * intensity
     drag = (1.0 - point.number("linear_share")) * math.exp(point.log_drag)
+    # Beyond this width not even the power of ten is known: the interval is open, and said to be.
     most = normal * math.log(INFLATION.most_factor)
     of_drag, of_force, reach_of_drag = (
         one if one < most else math.inf for one in (of_drag, of_force, reach_of_drag)
@@ -150,6 +151,8 @@ def parameter_facts(
     for name, (value, width) in values.items():
         facts[name] = value
         facts[f"{name}_interval"] = _ends(value, width)
+    # A face is cut into strips, which takes a little drag from a block that turns: C_d comes out
+    # too large by up to as much.
     if point.log_lever is not None:
         for name in {"drag_coefficient", "effective_drag_coefficient"} & values.keys():
             facts[f"{name}_interval"][0] *= 1.0 - strips_error(study.block.strips_per_face)

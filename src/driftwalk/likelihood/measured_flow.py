@@ -42,7 +42,8 @@ class MeasuredPolicy(NamedTuple):
     criterion of the check."""
     tolerated: float = 0.02
     """Difference of the flows, over the speed, that is no contradiction: what lies between the
-    knots. The exact flow of the bundled recording is 1 % off its best spline at the wall."""
+    knots. Measured: the exact flow of the bundled recording is 1 % off its best spline at the
+    wall."""
 
 
 MEASURED: Final = MeasuredPolicy()

@@ -37,13 +37,13 @@ class SeriesPolicy(NamedTuple):
     """Smallest mode that is taken of a flow that changes. Chosen by hand: a fifth of that."""
     most_modes: int = 5
     """With the mean, in the usual tank, they are as many coefficients as a fit of several flows may
-    have (`LimitPolicy.most_coefficients`)."""
+    have (`LimitPolicy.most_coefficients`); chosen by hand."""
     most_left: float = 0.03
-    """Largest mode that may be left out. Of jets that turn, one of 3.3 % made C_d 3 % too small,
-    one of 4.8 % 7 %, one of 8 % 12 %; when they were taken it was 1 to 3 %."""
+    """Largest mode that may be left out. Measured: of jets that turn, one of 3.3 % made C_d 3 % too
+    small, one of 4.8 % 7 %, one of 8 % 12 %; when they were taken it was 1 to 3 %."""
     above_noise: float = 2.0
     """Its singular value over the largest of independent errors, from which on it is no noise.
-    Windows that overlap by half share their errors and double it."""
+    Windows that overlap by half share their errors and double it; chosen by hand."""
     pooled: float = 10.0
     """Frames that the spread of all nodes counts in that of one node. Chosen by hand."""
 

@@ -18,7 +18,7 @@ from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.law.candidate_laws import NUMBERS
-from driftwalk.likelihood.prior import LEVER, MOST_FACTOR, Prior, Weights
+from driftwalk.likelihood.prior import LEVER, PRIOR, Prior, Weights
 from driftwalk.likelihood.refuse import BREAKDOWN, cholesky
 
 Tell = Callable[[int, int, str], None]
@@ -52,14 +52,14 @@ class SearchPolicy(NamedTuple):
     Chosen by hand."""
     left_over: float = 0.1
     """Part of `close` that may be left to the noises where the last steps hold them: a tenth, as
-    usual. Without it an orientation noise of 90 s ended 0.34 standard deviations off."""
+    usual. Measured: without it an orientation noise of 90 s ended 0.34 standard deviations off."""
     close_nats: float = 1.0
     """And when a whole step would raise the log likelihood by less than this [nat]. Hundreds of
     coefficients may each move by little and gain 100 nats together: on the plateau at the edge of a
-    narrow jet a search ended 170 nats above its minimum."""
+    narrow jet a search ended 170 nats above its minimum; chosen by hand."""
     most_left: float = 2.0
     """Standard deviations from the maximum beyond which an interval does not hold it. A body that
-    is driven on a circle without any force was given up 5 to 80 away."""
+    is driven on a circle without any force was given up 5 to 80 away; chosen by hand."""
     trial_iterations: int = 12
     """Most steps of a search that only tries whether a law or a number has a mode: as many as the
     longest usual search (docs/explanation/likelihood.md)."""
@@ -77,19 +77,19 @@ class WorkPolicy(NamedTuple):
     overhead_samples: float = 2000.0
     """Time of a pass besides its samples, in samples: measured on the first 100 and 300 s too."""
     from_afar: float = 9.0
-    """Passes of a search from afar."""
+    """Passes of a search from afar; measured."""
     of_pieces: float = 7.0
-    """Passes of a search on pieces of a long recording."""
+    """Passes of a search on pieces of a long recording; measured."""
     from_pieces: float = 4.0
-    """Passes of the search on all of a long recording that follows."""
+    """Passes of the search on all of a long recording that follows; measured."""
     score_tests: float = 2.5
-    """Passes that take as long as the score tests of closed numbers."""
+    """Passes that take as long as the score tests of closed numbers; measured."""
     restricted: float = 2.0
-    """Passes that take as long as the restricted likelihood."""
+    """Passes that take as long as the restricted likelihood; measured."""
     shared_stirring: float = 12.0
-    """Passes that the likelihoods of two bodies for all lengths take."""
+    """Passes that the likelihoods of two bodies for all lengths take; measured."""
     angle_given: float = 3.0
-    """Passes that take as long as the second fit, with the angle as an input."""
+    """Passes that take as long as the second fit, with the angle as an input; measured."""
 
 
 WORK: Final = WorkPolicy()
@@ -283,7 +283,9 @@ def limited(step: Floats, drag: int, opened: Sequence[str] = ()) -> Floats:
     """
     shorter = step * min(1.0, SEARCH.most_log_drag_step / max(abs(float(step[drag])), 1e-300))
     for index, power in ((1, 1.0), (2, 2.0)):
-        factor = np.clip(1.0 + power * step[drag + index], 1.0 / MOST_FACTOR, MOST_FACTOR)
+        factor = np.clip(
+            1.0 + power * step[drag + index], 1.0 / PRIOR.most_factor, PRIOR.most_factor
+        )
         shorter[drag + index] = math.log(factor) / power
     numbers = step.size - len(opened)
     levers = slice(drag + LEVER, numbers)
@@ -313,7 +315,8 @@ class ExcerptPolicy(NamedTuple):
     """The samples come in pieces of this many from all over the recordings. Chosen by hand."""
     interval_s: float = 0.1
     """The law is searched on samples this far apart, of a faster camera: ten times as many take ten
-    times as long and tell hardly more of it. The interval of most recordings of known truth."""
+    times as long and tell hardly more of it. The interval of most recordings of known truth; chosen
+    by hand."""
     worth_factor: float = 2.5
     """A search goes by way of pieces where the recordings have this many times as many samples.
     Chosen by hand."""

@@ -44,13 +44,14 @@ class PriorPolicy(NamedTuple):
     log_angle_noise_std: float = 2.3
     """A factor of ten: it counts only where the turning is so restless that nothing is known of the
     noise. Chosen by hand."""
+    most_factor: float = 10.0
+    """Largest factor by which q, r^2 or the weight of a penalty changes in a step. Chosen by
+    hand."""
 
 
 PRIOR: Final = PriorPolicy()
 LEVER, ANGLE_NOISE = 3, 4
 """Places of the lever and of the angle's noise, counted from C_d on."""
-MOST_FACTOR: Final = 10.0
-"""Largest factor by which q, r^2 or the weight of a penalty changes in a step. Chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,7 @@ class Prior:
             of_steady = coefficients[: len(steady)]
             value = float(np.einsum("ka,ab,kb->", of_steady, form, of_steady))
             wanted = old * (prior - posterior) / max(value, 1e-300)
-            new.append(float(np.clip(wanted, old / MOST_FACTOR, old * MOST_FACTOR)))
+            new.append(float(np.clip(wanted, old / PRIOR.most_factor, old * PRIOR.most_factor)))
         determined = 0.0
         if self.measured is not None:
             determined = self.measured.determined(
@@ -191,7 +192,7 @@ class Prior:
         form, modes = self.matrix(weights), coefficients[2:]
         taken = modes.size - weights.modes * sum(float((form * one).sum()) for one in parts[2:])
         value = float(np.einsum("ka,ab,kb->", modes, form, modes))
-        least, most = weights.modes / MOST_FACTOR, weights.modes * MOST_FACTOR
+        least, most = weights.modes / PRIOR.most_factor, weights.modes * PRIOR.most_factor
         factor = float(np.clip(taken / max(value, 1e-300), least, most))
         return Weights(new[0], new[1], determined, factor)
 

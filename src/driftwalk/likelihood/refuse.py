@@ -29,13 +29,13 @@ class LengthPolicy(NamedTuple):
     by hand."""
     usual_s: float = 1200.0
     """Length [s] in which C_d comes out to the two precisions that follow: 20 minutes, 10 to 30 by
-    the flow. A rule of thumb."""
+    the flow. A rule of thumb, chosen by hand."""
     without_angle: float = 0.1
     """Standard error of ln C_d in that time without orientations. Cautious: half an hour has 6 % on
     the bundled recording (docs/explanation/likelihood.md)."""
     with_angle: float = 0.05
     """Standard error of ln C_d in that time with orientations. Cautious: half an hour has 1 % on
-    the bundled recording."""
+    the bundled recording (docs/explanation/likelihood.md)."""
 
 
 LENGTH: Final = LengthPolicy()

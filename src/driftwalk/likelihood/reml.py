@@ -64,10 +64,11 @@ class RemlPolicy(NamedTuple):
     the motion does not follow the model, or tells nothing of C_d. Chosen by hand."""
     true_pull: float = 0.67
     """The pull of a disc's prior on the true flow, over that on the fitted one, whose errors add to
-    it. The first 29 recordings of known flow; it was not chosen by their C_d."""
+    it. Measured on the first 29 recordings of known flow; it was not chosen by their C_d."""
     most_noise_move: float = 1.0
     """Largest move of ln(tracking noise) along the ridge of a criterion that has a minimum: beyond
-    it nothing holds the noise. In recordings of the model it moves by some hundredths."""
+    it nothing holds the noise. Chosen by hand: in recordings of the model it moves by some
+    hundredths."""
 
 
 REML: Final = RemlPolicy()
@@ -299,7 +300,6 @@ def due_share(passes: Passes, prior: Floats, point: Point) -> float:
 
 
 def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other: Floats) -> None:
-    """Add A and B of a series."""
     body, spline = passes.body, passes.spline
     # Many samples within a tenth of a second tell the same.
     states, time = passes.states(series, point)[:: series.pooled], series.time[:: series.pooled]

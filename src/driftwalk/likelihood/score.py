@@ -227,7 +227,7 @@ def _relative(found: Floats, truth: Floats) -> float:
 
 
 NEEDED_CONFIDENCE: Final = 0.9
-"""Confidence of the interval of the time that one must record."""
+"""Confidence of the interval of the time that one must record; by convention."""
 
 
 class Scale(NamedTuple):

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 
 DEGREE = 3
+"""Cubic: the flow's second derivatives, of which the roughness is made, are continuous."""
 
 
 @dataclass(frozen=True)

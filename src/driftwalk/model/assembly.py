@@ -17,6 +17,7 @@ Latching = Literal["collision", "connector", "none"]
 HiddenFaceDrag = Annotated[
     float | Literal["none", "full"], Quantity("1", ge=0, le=1, words=("none", "full"))
 ]
+"""A share of a free face's drag."""
 Chirality = Literal["merged", "distinct"]
 
 

@@ -188,7 +188,9 @@ def _sizes(text: str) -> dict[str, str]:
 
 
 DragCoefficient = Annotated[float, Quantity("1", ge=0, le=100)]
+"""Bounds are a hundred times what bodies have: they catch a wrong unit."""
 ForceStd = Annotated[float, Quantity("N", ge=0, le=10)]
+"""Bounds are ten thousand times what the paper found: they catch a wrong unit."""
 
 
 class Forces(Section):

@@ -12,7 +12,9 @@ from driftwalk.model.block import DragCoefficient, ForceStd
 from driftwalk.model.section import Quantity, Section, Seed
 
 DragCoefficientStep = Annotated[float, Quantity("1", gt=0, le=100)]
+"""Bounds as those of the number itself."""
 ForceStdStep = Annotated[float, Quantity("N", gt=0, le=10)]
+"""Bounds as those of the number itself."""
 
 
 class ForceGrid(Section):

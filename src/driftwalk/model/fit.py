@@ -12,6 +12,7 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.section import Placeholder, Quantity, Section
 
 Time = Annotated[float, Quantity("s", ge=-1e12, le=1e12)]
+"""Bounds as those of the time stamps that are read: powers of longer times are beyond float64."""
 
 
 class Fit(Section):

@@ -12,8 +12,8 @@ from driftwalk.model.fit import Fit
 from driftwalk.model.section import Placeholder, Quantity, Section, Seed, distinct, quoted, words_of
 
 LARGEST_STEP_S: Final = 0.0025
-"""Largest time step of a simulation that is taken for the truth: its error is then far below what
-a recording can tell."""
+"""Largest time step of a simulation that is taken for the truth: its error is then far below what a
+recording can tell; chosen by hand."""
 RANDOM: Final = "random"
 
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.schema.shapes import Cells, cells_of_shape
+from driftwalk.schema.shapes import STEPS, Cells, cells_of_shape
 
 
 class Measures(NamedTuple):
@@ -195,8 +195,6 @@ def _seven_points(radius: float) -> Floats:
 
 MOST_CELLS = 64
 """A body may have this many: in every step 32 panels of each are read."""
-STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))
-"""From a cell to its neighbours."""
 
 
 def polyomino(shape: str) -> Callable[[Measures], RigidBody] | None:

@@ -119,6 +119,7 @@ class Quantity:
 
 
 Seed = Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)]
+"""The largest is that of a 64-bit integer of a NetCDF file."""
 
 
 @dataclass(frozen=True)

@@ -111,6 +111,8 @@ def simulate_motion(
         if sample_time is not None or start is not None:
             raise InputError("with `like`, the recording gives times and start")
         track = body_track(like, body)
+        # The study as the recording was seen: its tank, body and camera, so that both can be
+        # compared.
         study = study_as_seen(study, like, track)
         camera = plain_camera(study)
         conditions = recorded_conditions(
@@ -249,6 +251,8 @@ def _dataset(
     stated = {one.key: values[one.name] for one in model.parameters}
     attrs: dict[str, Any] = {"model": model.name, **model.facts(values)}
     if isinstance(model, ParticleModel):
+        # Numbers that the caller fixed are no parameters of the model, and a repeated run needs
+        # them.
         stated |= model.known
         attrs["time_step_s"] = time_step_of(conditions.sample_time)
     return build_dataset(

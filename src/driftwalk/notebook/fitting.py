@@ -201,6 +201,7 @@ def calibrate(
     chosen = study_for([recording], study, overrides, body=body, needs_tank=is_block)
     field = None if flow is None else flow_field_of(flow)
     say = progress or silent
+    # In a folder it is the run of the command line: either continues what the other began.
     if folder is not None:
         work = CalibrationWork(recording, chosen, field, body, {}, threads, model)
         return as_result(run_in_folder(folder, "calibrate", work, overwrite, say, executor))
@@ -310,6 +311,7 @@ def compare_models(
     conditions = study_for([recording], study, overrides, body=body, needs_tank=chosen == ["block"])
     field = None if flow is None else flow_field_of(flow)
     say = progress or silent
+    # In a folder it is the run of the command line: either continues what the other began.
     if folder is not None:
         work = ModelComparisonWork(recording, chosen, conditions, field, body, {}, threads)
         found = run_in_folder(folder, "compare_models", work, overwrite, say, executor)

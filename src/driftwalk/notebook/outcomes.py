@@ -213,6 +213,8 @@ def maximise_yield(
         "indifference": indifference,
     }
     if folder is not None:
+        # A folder keeps the axes as values in its study, so that the run can go on without the
+        # caller.
         chosen = make_axes(found.study, axes) if axes else None
         study, flows = (found.study, {}) if chosen is None else (chosen.study, chosen.flows)
         work = YieldWork(study, found.flow, options, flows, {}, threads)

@@ -151,13 +151,7 @@ def _of_motion_model(
 
 
 def _refuse_numbers_alone(source: Study | xr.Dataset) -> None:
-    """Refuse a calibration of another model than the block: it holds the numbers of one, no more.
-
-    Raises
-    ------
-    InputError
-        Says how to simulate that model.
-    """
+    """Refuse a calibration of another model than the block: it holds numbers, and no model."""
     name = getattr(source, "attrs", {}).get("model")
     if name is not None:
         raise InputError(

@@ -19,7 +19,8 @@ from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text_files import json_value
 
 SHORT: Final = 64
-"""Arrays with fewer numbers than this stand as a plain list where their reader allows it."""
+"""Arrays with fewer numbers than this stand as a plain list where their reader allows it; chosen by
+hand."""
 
 
 def encode_array(

@@ -17,6 +17,7 @@ from driftwalk.core.files.atomic import require_target, write_atomic
 
 FORMAT: Final = "driftwalk page"
 VERSION: Final = 1
+"""Version of the data in a page; the script of a page reads its own alone."""
 BUNDLE: Final[dict[str, str]] = {
     "driftwalk.css": "text/css; charset=utf-8",
     "driftwalk.js": "text/javascript; charset=utf-8",

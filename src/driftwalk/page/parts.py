@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 
 _PREFIXES: Final = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
+"""SI prefix by power of ten."""
 _PREFIXED: Final = ("m", "s", "N", "m/s", "Hz")
 
 
@@ -134,7 +135,8 @@ _ARENA_KEYS: Final = {
 FOUND_TITLE: Final = "Results"
 SIMULATED: Final = "The recording was simulated: it is not a measurement."
 MOST_SETTINGS: Final = 50_000
-"""Combinations of parameters that a page names; a cube of 31 values a side has 29,791."""
+"""Combinations of parameters that a page names; a cube of 31 values a side has 29,791; chosen by
+hand."""
 
 
 def section(id: str, kind: str, title: str, note: str | None = None, **content: Any) -> Section:

@@ -40,8 +40,8 @@ SURVIVAL: Final = {
     "first_contact": ("no two blocks have met", style.BLUE, "-"),
     "completion": ("not yet one assembly", style.ORANGE, (0, (5, 2))),
 }
+"""Words, colour and dashes of each time until an event."""
 
-BAR_WIDTH: Final = 0.76
 COMPACT: Final = "compactness"
 GROWTH: Final = {
     "mean size": {"mean_size": "mean size"},
@@ -339,7 +339,7 @@ def plot_assembly_sizes(
         check_kind(one, "assembly_sizes", "size", "size_to", "block_share")
     ax = style.axes_or_new(ax, height_mm=65.0)
     place = np.arange(sizes.sizes["size"])
-    height = BAR_WIDTH / len(both)
+    height = style.BAR_WIDTH / len(both)
     for index, (one, color) in enumerate(zip(both, (style.BLUE, style.ORANGE), strict=False)):
         share, low, high = (one[f"block_share{end}"].values for end in ("", "_low", "_high"))
         ax.barh(

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SKETCH_CELL_PT: Final = 3.0
+"""Side of a block in the sketch of a label [pt]; chosen by eye."""
 # Points of an arrow that a label had better not cover, as shares of its length.
 ALONG: Final = np.linspace(0.1, 1.0, 19)
 # How bad a place for a label is, by what it covers and how far it is [per pt].

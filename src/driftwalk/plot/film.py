@@ -40,11 +40,13 @@ CODECS: Final = ("vp09", "mp4v")
 FILM_MM: Final = 101.6
 """Width and height of a film [mm]: an even number of dots, as encoders ask."""
 DOTS_PER_INCH: Final = {".gif": 100, ".mp4": 200}
+"""By ending: 400 dots a side for a GIF, whose size grows fast, and 800 for a film."""
 TRAIL_S: Final = 5.0
 """How long the trail behind a body is, in seconds of the film."""
 MOST_TRAILS: Final = 64
 """Bodies of a film up to which trails and pointers are drawn; chosen by eye."""
 SHORTEST_S: Final = 0.2
+"""Two frames of the slowest kind and more [s]; chosen by hand."""
 MOST_FRAMES: Final = 15_000
 """Ten minutes of an MP4; a longer film is rather shown faster."""
 

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SHOWN_SHARE = 0.01
-"""Classes that reach this share are drawn, and the transitions with this part of what leaves."""
+"""Classes that reach this share are drawn, and the transitions with this part of what leaves;
+chosen by hand."""
 MOST_ROWS: Final = 8
 """Classes of one column: as many as one page is high enough for; chosen by eye."""
 CLASS_PT = 28.0

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-BAR_WIDTH = 0.76
 # Width of axes in one column of a page; of its 255 pt the y axis and its label take the rest.
 COLUMN_PT = 210.0
 
@@ -101,7 +100,7 @@ def plot_outcomes(
     wide = len(both) > 1 or len(drawn) > 12 or not names_fit(drawn, COLUMN_PT)
     ax = _new_axes(wide=wide) if ax is None else ax
     place = np.arange(len(drawn), dtype=np.float64)
-    width = BAR_WIDTH / len(both)
+    width = style.BAR_WIDTH / len(both)
     for index, (dataset, color) in enumerate(zip(both, (style.BLUE, style.ORANGE), strict=False)):
         at = place + (index - (len(both) - 1) / 2.0) * width
         _draw_bars(

@@ -43,7 +43,9 @@ SHARE_LABEL: Final = "share of runs"
 FLOOR_LABEL: Final = "95 % noise floor"
 REFERENCE_LABEL: Final = "reference"
 KEY_ROW_MM: Final = 11.0
+"""Height of a row of sketches with their names; chosen by eye."""
 MM_PER_PT: Final = style.MM_PER_INCH / 72.0
+"""A point is 1/72 inch."""
 MARKERS: Final = "osD^v<>"
 
 

@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 
 Marginals = Literal["shown", "none"]
 BINS = 48
-# Axes and bins reach over the central part of the steps; one wild step must not squeeze the rest.
+"""Bins along each axis, fine enough for the eye; chosen by eye."""
+# Axes and bins reach over the central part of the steps; one wild step must not squeeze the rest;
+# chosen by hand.
 SHOWN_FRACTION = 0.9995
 DENSITY_LABEL = "density of steps (% mm⁻¹ °⁻¹)"
 MM_PER_M = FACTORS["m", "mm"]
@@ -302,6 +304,7 @@ def plot_density_panels(
     length_mm = MM_PER_M * calibration["step_length_edge"].values
     angle_deg = DEGREES * calibration["turning_angle_edge"].values
     densities = [recorded, *(setting.density for setting in settings)]
+    # One scale of colour for all panels: they are compared with each other.
     top = max(
         float(density_of(density, length_mm, angle_deg).max(initial=0.0)) for density in densities
     )

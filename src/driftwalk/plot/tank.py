@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 POSES: Final = ("x", "y", "theta", "assembly")
 
-# Neighbours further apart than this many usual intervals have a gap between them.
+# Neighbours further apart than this many usual intervals have a gap between them; chosen by hand.
 GAP_INTERVALS = 1.5
 
 

@@ -22,7 +22,6 @@ def words(name: str) -> frozenset[str]:
 
 
 def _meanings(table: str) -> dict[str, str]:
-    """Return the meaning of each word of a table."""
     return {word: meaning for meaning, words in _FILE[table].items() for word in words.split()}
 
 

@@ -20,14 +20,17 @@ if TYPE_CHECKING:
 
 
 FIXED_TRIAL: Final = 0
+"""Trial of the runs at the stated parameters."""
 DRAWN_TRIAL: Final = 1
 """The two sets of runs have different random numbers, so that they can be compared."""
 REGION: Final[tuple[str, ...]] = ("region_drag_coefficient", "region_force_std", "refined_surface")
 """Variables of a calibration that parameters are drawn from."""
 PATH_RUNS: Final = 4
+"""Runs whose paths are kept, for the film and the page; chosen by hand."""
 PATH_INTERVAL_S: Final = 0.1
+"""Time between samples of such a path [s]: ten frames a second are smooth to the eye."""
 PATH_SAMPLES: Final = 6000
-"""Most samples of a path that is kept; longer runs are sampled more rarely."""
+"""Most samples of a path that is kept; longer runs are sampled more rarely; chosen by hand."""
 
 
 @dataclass(frozen=True)

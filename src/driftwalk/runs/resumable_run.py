@@ -195,6 +195,7 @@ def run_work(
             inputs=dict(work.inputs),
             instruction_set=_core.instruction_set(),
         )
+        # What is said first comes after the folder was accepted: a refusal stands alone.
         begun()
         run = Run(
             body=getattr(work, "body", None),

@@ -156,6 +156,7 @@ _READER_UNITS: Final = MappingProxyType({"N": "mN", "m": "mm", "1": ""})
 _FACTORS: Final = MappingProxyType(
     {"mN": 1e3, "cm": 1e2, "mm": 1e3, "ms": 1e3, "g/s": 1e3, "%": 1e2, "°": math.degrees(1.0)}
 )
+"""From SI to the unit that a reader sees."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ class OutlierPolicy(NamedTuple):
 
     far: float = 6.0
     """Robust standard deviations off the line between its neighbours beyond which a sample may be a
-    mistake: of a normal law one in 65 million."""
+    mistake: by chance, of a normal law, one in 65 million."""
     opposite: float = 0.25
     """Least part of its own distance by which both neighbours lie off to the other side. A mistake
     alone has 0.5. Chosen by hand."""

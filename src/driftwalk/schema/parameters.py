@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 Scale = Literal["linear", "log"]
 
 USUAL_VALUES: Final = 41
-"""Values of the coarse grid of a parameter whose step is left open."""
+"""Values of the coarse grid of a parameter whose step is left open; chosen by hand."""
 REFINEMENT: Final = 5
-"""How many steps of the refined grid a coarse step has, where that is left open."""
+"""How many steps of the refined grid a coarse step has, where that is left open; chosen by hand."""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,9 @@ from typing import Final
 Cell = tuple[int, int]
 Cells = tuple[Cell, ...]
 
+STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
+"""From a cell to its neighbour at each face, in the order of the faces."""
+
 NAMED_SHAPES: Final[dict[str, str]] = {
     "1": "x",
     "2": "xx",

@@ -15,7 +15,8 @@ class NoisePolicy(NamedTuple):
     """How the tracking noise is separated from the motion of a body."""
 
     order: int = 4
-    """Order of the differences: a path that is a cubic over five samples leaves nothing."""
+    """Order of the differences: in closed form, a path that is a cubic over five samples leaves
+    nothing."""
     lags: int = 6
     """Largest lag of the products of differences; chosen by hand."""
     trim: float = 5.0
@@ -33,8 +34,8 @@ class NoisePolicy(NamedTuple):
     """Standard errors by which the estimate must exceed the bound to be replaced by it; chosen
     by hand."""
     reach: float = 4.0
-    """Standard deviations by which noise may show a body beyond a wall: one sample of 30,000
-    lies farther."""
+    """Standard deviations by which noise may show a body beyond a wall: by chance one sample of
+    30,000 lies farther."""
     most_reach: float = 0.05
     """Largest such reach, as a share of the tank: with more, the tank or the scale is wrong;
     chosen by hand."""
@@ -210,6 +211,7 @@ def _bounded(estimate: _Estimate, track: Track) -> _Estimate:
 
 
 _NOTHING = _Estimate(math.nan, math.nan, math.nan, 0)
+"""Stands where nothing can be estimated."""
 
 
 @remembered

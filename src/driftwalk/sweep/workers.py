@@ -37,7 +37,8 @@ from driftwalk.core.provenance import package_versions
 from driftwalk.sweep.design import WorkUnit
 
 KEPT: Final = 4
-"""Functions that a process keeps ready: one for each stage that may be under way."""
+"""Functions that a process keeps ready: one for each stage that may be under way; chosen by
+hand."""
 
 
 Guard = Callable[[], None]

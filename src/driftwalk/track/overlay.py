@@ -27,7 +27,9 @@ _COLOURS: Final = (
     (66, 228, 240),
 )
 _DARK, _LIGHT, _WARNING = (0, 0, 0), (255, 255, 255), (0, 0, 255)
+"""Colours of words: blue, green, red."""
 _ACCEPTED, _REJECTED = (80, 220, 80), (60, 60, 240)
+"""Colours of regions that count, and of those that do not."""
 _CODECS: Final = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}
 
 

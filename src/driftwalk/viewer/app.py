@@ -22,11 +22,9 @@ from driftwalk.viewer.hub import Content, Hub, Outbox, Source, make_message, par
 from driftwalk.viewer.security import HEADERS, Gate
 
 REQUEST_S: Final = 10.0
-"""For how long a connection may take to send a whole request [s].
-
-The head of one has some hundred bytes: a phone on a bad line needs a second or two. Whoever sends
-half of it and waits would otherwise hold an open file of the server without end.
-"""
+"""For how long a connection may take to send a whole request [s]. The head of one has some hundred
+bytes: a phone on a bad line needs a second or two. Whoever sends half of it and waits would
+otherwise hold an open file of the server without end; chosen by hand."""
 
 Failed = Callable[[BaseException], None]
 

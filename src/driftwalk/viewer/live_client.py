@@ -20,11 +20,12 @@ from driftwalk.core.errors import InputError
 from driftwalk.page.html import page_frame
 from driftwalk.page.parts import section
 from driftwalk.viewer.hub import Content, Publish, Source, parsed
+from driftwalk.viewer.server import LAST_PORT
 
 SAID_EVERY_S: Final = 5.0
-"""Time after which new counts are said [s]; a new reason is said at once."""
+"""Time after which new counts are said [s]; a new reason is said at once; chosen by hand."""
 MOST_REASONS: Final = 3
-"""Reasons that are named of each kind, the most frequent ones."""
+"""Reasons that are named of each kind, the most frequent ones; chosen by hand."""
 KINDS: Final = {
     "line": ("line", "lines"),
     "frame": ("whole frame", "whole frames"),
@@ -35,6 +36,7 @@ KINDS: Final = {
 }
 """Names of parts that can be left out, in singular and plural."""
 FACES: Final = range(4)
+"""Numbers of a block's faces."""
 
 Fault = str | None
 Check = Callable[[Any], Fault]
@@ -248,10 +250,11 @@ VALUES: Final[dict[str, Check]] = {
 
 FORMAT: Final = "driftwalk live"
 VERSION: Final = 1
+"""Version of the stream; another version is refused."""
 LONGEST_LINE: Final = 1 << 25
-"""Longest line [byte] that is read: a frame with a large image."""
+"""Longest line [byte] that is read: a frame with a large image; chosen by hand."""
 FIRST_PAUSE_S: Final = 0.25
-LAST_PORT: Final = 65535
+"""Pause before the first new attempt to connect [s]; it doubles up to a second. By hand."""
 WIDTHS: Final = range(16, 4097)
 """Widths [px] in which a tracker sends its images."""
 

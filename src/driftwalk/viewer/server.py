@@ -14,8 +14,9 @@ from driftwalk.viewer.hub import Source
 from driftwalk.viewer.security import is_any, make_gate
 
 LAST_PORT: Final = 65535
+"""A port has 16 bits."""
 LONGEST_MESSAGE: Final = 1 << 16
-"""Longest message [byte] that is taken from a browser."""
+"""Longest message [byte] that is taken from a browser; chosen by hand."""
 
 
 def serve(

@@ -40,19 +40,19 @@ class EmPolicy(NamedTuple):
     """How the likelihood is maximised; checked on the settings of `studies/kinetics`."""
 
     events_per_bin: int = 20
-    """Fewer events of a class than ten bins of these give it fewer bins."""
+    """Fewer events of a class than ten bins of these give it fewer bins; chosen by hand."""
     weight: float = 1.0
     """Events that are added to each bin, at the mean rate of the class, and to each transition, in
     its mean share of them. By hand: .3 and 2 change the held-out log likelihood per run by .012 at
     most (2000 runs, seven settings of `studies/kinetics`)."""
     switch_weight: float = 0.5
-    """Runs that are added to each change of hidden state."""
+    """Runs that are added to each change of hidden state; chosen by hand."""
     spread: float = 6.0
-    """Ratio of the rates of neighbouring hidden states at the start."""
+    """Ratio of the rates of neighbouring hidden states at the start; chosen by hand."""
     sticky: float = 0.7
-    """Probability to keep the hidden state at the start."""
+    """Probability to keep the hidden state at the start; chosen by hand."""
     iterations: int = 400
-    """Iterations at most; the settings of the study took up to 300."""
+    """Iterations at most; the settings of `studies/kinetics` took up to 300."""
     tolerance: float = 1e-2
     """Gain of the log likelihood below which the iterations end; chosen by hand."""
 

@@ -21,18 +21,22 @@ class MixingPolicy(NamedTuple):
     """When a tank counts as well mixed."""
 
     level: float = 0.05
-    """False alarms over all tests together (Holm), shown on simulated chains in the tests."""
+    """Rate of false alarms over all tests together (Holm), shown on simulated chains in the
+    tests."""
     least_events: int = 20
-    """Events without which a class is not tested; checked on simulated chains in the tests."""
+    """Events without which a class is not tested; chosen by hand, checked on simulated chains in
+    the tests."""
     margin: float = 1.1
     """A shape within this factor of 1 counts as exponential: 1.04 to 1.08 in water at rest, where
     the Markov chain predicts 2000 runs to the floor (`studies/kinetics`)."""
     shape: float = 0.75
-    """Weibull shape that has to be found; the weakest that control.md's settings showed is 0.73."""
+    """Weibull shape that has to be found; the weakest that was measured in the settings of
+    `studies/kinetics` is 0.73."""
     power: float = 0.9
-    """How often it has to be found."""
+    """How often it has to be found; by convention, twice as often missed as falsely found."""
     permutations: int = 999
-    """Permutations of the runs over two data sets; the smallest p-value is 0.001."""
+    """Permutations of the runs over two data sets; the smallest p-value is 0.001, in closed
+    form."""
 
 
 MIXING_POLICY = MixingPolicy()

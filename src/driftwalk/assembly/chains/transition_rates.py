@@ -49,20 +49,22 @@ class KineticsPolicy(NamedTuple):
     least_runs: int = 20
     """Runs without which no model is chosen; chosen by hand, four in each part."""
     replicates: int = 50
-    """Bootstrap samples of the runs: their standard deviation is known within a tenth."""
+    """Bootstrap samples of the runs: their standard deviation is known within a tenth, in closed
+    form 1 / sqrt(2 n)."""
     reached: int = 5
     """Samples that reach the target without which its time has no error; chosen by hand."""
     iterations: int = 30
-    """Iterations of a replicate, which begins at the estimate."""
+    """Iterations of a replicate, which begins at the estimate; chosen by hand."""
     runs_per_part: int = 5
     """Runs for each part of a class's time; the parts tell how events cluster. With 20 and 60 runs
     the intervals of each transition held in 89 % or more (three settings of `studies/kinetics`)."""
     most_parts: int = 50
-    """Such parts, at most: Student's quantile is that of the normal law within 2 %."""
+    """Such parts, at most: Student's quantile is that of the normal law within 2 %; in closed
+    form."""
     stored: int = 120
-    """Steps of the stored curves."""
+    """Steps of the stored curves; chosen by hand."""
     confidence: float = 0.9
-    """Of the intervals and bands; that of the rest of driftwalk."""
+    """Of the intervals and bands; by convention that of the rest of driftwalk."""
 
 
 KINETICS_POLICY = KineticsPolicy()
@@ -157,6 +159,8 @@ def kinetics(
     best = int(scores.mean(axis=1).argmax())
     behind = scores - scores[best]
     error = behind.std(axis=1, ddof=1) / np.sqrt(found.runs)
+    # Forms stand with the simplest first: of those within a standard error of the best, the first
+    # is taken, as the runs do not show that they need more.
     chosen = int(np.flatnonzero(behind.mean(axis=1) >= -error)[0])
     model = fit(found, FORMS[chosen])
     pairs = np.argwhere(np.sum([counts_and_times(one)[0] for one in sets], axis=0) > 0)

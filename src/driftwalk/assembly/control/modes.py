@@ -146,6 +146,8 @@ def make_modes(
     names = []
     for at, (source, scale, std) in enumerate(rows):
         own = sources[source].study.forces.force_std_N
+        # A stated force keeps the relative uncertainty of the estimate. A source with fewer draws
+        # than another repeats them.
         ratio = np.resize(draws[source][0], count) / (own or 1.0)
         drawn = own * ratio if own else np.resize(draws[source][0], count)
         force[at] = drawn if std is None else std * (ratio if own else 1.0)

@@ -47,7 +47,8 @@ class ImprovementPolicy(NamedTuple):
     """How much a plan and earlier runs count."""
 
     weight: float = 150.0
-    """Worlds that value iteration counts for in each cell; 20 took twice as many rounds."""
+    """Worlds that value iteration counts for in each cell; measured: 20 took twice as many
+    rounds."""
     kept: float = 0.9
     """Share of what earlier rounds count for: the policy around a cell was another one. By hand."""
     greedy: int = 4
@@ -143,7 +144,7 @@ class ControlPolicy(NamedTuple):
     unit: int = 250
     """Worlds of a work unit, about a second; chosen by hand."""
     confidence: float = 0.9
-    """Of the intervals; that of the rest of driftwalk."""
+    """Of the intervals; by convention that of the rest of driftwalk."""
 
 
 CONTROL_POLICY = ControlPolicy()

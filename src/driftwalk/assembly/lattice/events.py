@@ -26,7 +26,7 @@ from driftwalk.assembly.lattice.many_blocks import (
     SquareWorld,
     replay_many,
 )
-from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
+from driftwalk.assembly.lattice.polyomino import Chirality, name_of, require_chirality
 from driftwalk.assembly.outcomes.outcome_classes import (
     class_name,
     contact_pairs,
@@ -37,7 +37,7 @@ from driftwalk.assembly.outcomes.outcome_classes import (
 )
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.shapes import MOST_NAMED, all_single, moved_to_origin
+from driftwalk.schema.shapes import MOST_NAMED, STEPS, all_single, moved_to_origin
 
 
 def replay_events(

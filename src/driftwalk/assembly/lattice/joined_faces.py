@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Assembly
 
 QUARTER: Final = math.pi / 2
+"""A turn from one face of a square block to the next [rad]."""
 # Time stamps are decimal numbers: 0.8 - 0.3 must count as half a second.
 ROUNDING: Final = 1e-9
 
@@ -340,12 +341,13 @@ class PlayPolicy(NamedTuple):
     least: float = 0.02
     """Smallest play, in sides; chosen by hand: a lens bends the picture by as much."""
     moves: float = 2.0
-    """Play in units of the median movement; white noise is beyond it in one sample of 3000."""
+    """Play in units of the median movement; chance, as white noise, is beyond it in one sample of
+    3000."""
     taught: float = 0.9
     """Share of the joined samples that teach how faces lie; chosen by hand."""
     sure_s: float = 10.0
-    """Time after which faces at rest are joined however they lie [s]; longer than each passing
-    contact of 40 simulated recordings of 300 s (6 s at most)."""
+    """Time after which faces at rest are joined however they lie [s]; measured: longer than each
+    passing contact of 40 simulated recordings of 300 s (6 s at most)."""
 
 
 PLAY_POLICY: Final = PlayPolicy()

@@ -14,12 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, OPENING, PARTING
-from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, put_beside, shape_order
+from driftwalk.assembly.lattice.polyomino import Chirality, name_of, put_beside, shape_order
 from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import (
     MOST_CELLS_NAMED,
     MOST_DISCS,
+    STEPS,
     counted_class,
     counted_graph,
     counted_shape,

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import (
     NAMED_SHAPES,
+    STEPS,
     Cell,
     Cells,
     cells_of_shape,
@@ -31,10 +32,9 @@ from driftwalk.schema.shapes import (
 Chirality = Literal["merged", "distinct"]
 
 LARGEST: Final = 10
-"""Largest size of which all shapes are listed: there are 4655, and four times more per cell."""
+"""Largest size of which all shapes are listed: there are 4655, and four times more per cell; chosen
+by hand."""
 
-STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
-"""From a cell to its neighbour at each face."""
 _MIRRORED: Final = frozenset({"Z", "J"})
 # Cells before gaps, and wide shapes before narrow ones.
 _BY_CELLS: Final = str.maketrans("x/.", "012")

@@ -14,9 +14,11 @@ class EmulatorPolicy(NamedTuple):
     """How the emulator is fitted and integrated."""
 
     pseudo_count: float = 0.5
-    """Added to the count of each category: Jeffreys' prior of a multinomial."""
+    """Added to the count of each category: Jeffreys' prior of a multinomial; a closed form without
+    tuning."""
     mean_variance: float = 25.0
-    """Prior variance of the mean of a log share: e^5 up or down, so that the nodes decide."""
+    """Prior variance of the mean of a log share: e^5 up or down, so that the nodes decide; chosen
+    by hand."""
     length: float = 0.3
     """Median of the prior of a length scale, in parts of a range; chosen by hand."""
     length_spread: float = 1.0

@@ -164,14 +164,17 @@ class DesignPolicy(NamedTuple):
     runs: int = 300
     """Simulated runs of a node; chosen by hand."""
     truths: int = 200
-    """Data sets of the self-check: a coverage of 90 % is known within 2 %."""
+    """Data sets of the self-check: a coverage of 90 % is known within 2 %, in closed form."""
     points: int = 8192
     """Sample of the prior, on which posteriors are computed: a power of two. Chosen by hand."""
     noise: float = 0.1
     """Error of the emulator, in parts of the sampling error of the data, below which no further
     node is simulated; chosen by hand."""
     spread: float = 0.5
-    """Power of the posterior that places further nodes: below one, its surroundings get some."""
+    """Power of the posterior that places further nodes: below one, its surroundings get some;
+    chosen by hand."""
+    fewest: int = 20
+    """Runs of a node, or truths, without which none is begun; chosen by hand."""
 
 
 DESIGN_POLICY = DesignPolicy()
@@ -266,8 +269,8 @@ def check_outcomes(
     chosen = Study() if study is None else study
     observed = observed_of(given, after=after, breaks=chosen.assembly.bonds_break)
     for name, number in (("runs", runs), ("truths", truths)):
-        if number < 20:
-            raise InputError(f"{name}: expected at least 20, got {number}")
+        if number < DESIGN_POLICY.fewest:
+            raise InputError(f"{name}: expected at least {DESIGN_POLICY.fewest}, got {number}")
     if observed.blocks != chosen.assembly.blocks:
         raise InputError(
             f"the outcomes have {observed.blocks} blocks, and the study has "

@@ -33,6 +33,7 @@ EARLY: Final = "a tenth of the time"
 KINDS: Final = (CLASSES, TIMES, BOTH, JOINS, EARLY)
 """Kinds of data: what is seen of every run."""
 EARLY_PART: Final = 0.1
+"""The part of the time that `EARLY` names; chosen by hand."""
 REST: Final = "rest"
 
 
@@ -245,6 +246,7 @@ def observed_of(given: Outcomes, *, after: float | None, breaks: bool = False) -
         breaks |= any("event_kind" in one for one in datasets)
         length, until = _known_until(found, breaks=breaks)
         earliest = int(until.argmin())
+        # All runs are read at one time, the last at which the class of each of them is known.
         if after is None:
             after = float(min(until[earliest], length.max()))
         if after > until[earliest]:

@@ -13,16 +13,17 @@ class RegionPolicy(NamedTuple):
     """How regions are stated, and when they are not."""
 
     confidence: float = 0.9
-    """Of intervals and regions; that of the rest of driftwalk."""
+    """Of intervals and regions; by convention that of the rest of driftwalk."""
     slack: float = 2.35
     """Standard errors by which the coverage in the self-check may be smaller: to 85 % with 200
     truths. Of exact regions, 1 % are smaller by chance."""
     powers: tuple[float, ...] = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3)
-    """Powers of the likelihood that are tried; below that, none is offered."""
+    """Powers of the likelihood that are tried; below that, none is offered; chosen by hand."""
     tried: int = 41
     """Intervals of which the shortest is taken; chosen by hand."""
     prior_like: float = 0.8
-    """A parameter whose interval is this part of the prior's one is not determined."""
+    """A parameter whose interval is this part of the prior's one is not determined; chosen by
+    hand."""
     edge: float = 0.01
     """Share of a range within which an end of an interval is that of the range; chosen by hand."""
     unlike: float = 0.01

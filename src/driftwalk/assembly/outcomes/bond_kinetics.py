@@ -19,10 +19,10 @@ from driftwalk.core.intervals import check_confidence
 from driftwalk.schema.shapes import cells_of_shape, joins_of_cells
 
 RATE_CONFIDENCE: Final = 0.9
-"""Probability with which an interval of a rate holds, as elsewhere."""
+"""Probability with which an interval of a rate holds, as elsewhere; by convention."""
 PARTS: Final = 5
-"""Parts of a class's time that tell how events cluster; of 4, 5, 8 and 12 the number whose 90 %
-intervals held most evenly in simulated recordings of 300 to 1800 s."""
+"""Parts of a class's time that tell how events cluster; measured: of 4, 5, 8 and 12 the number
+whose 90 % intervals held most evenly in simulated recordings of 300 to 1800 s."""
 
 
 def rate_interval(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# Singular values below this part of the largest are rounding.
+# Singular values below this part of the largest are rounding; chosen by hand.
 RANK_TOLERANCE = 1e-9
 
 

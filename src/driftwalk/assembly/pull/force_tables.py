@@ -44,14 +44,14 @@ class SteppingPolicy(NamedTuple):
     """How long distant magnets may wait, and which ones are distant."""
 
     every: int = 5
-    """Time steps of a cycle; odd, so that a step is its middle."""
+    """Time steps of a cycle; odd, so that a step is its middle; chosen by hand."""
     stiffness: float = 1.0
     """Most of 4 F' (n dt)² / m where forces begin to be distant. From 0.02 to 1, outcomes and times
     of 4000 runs of 4 blocks differ from those of one step by less than half of what chance makes
     of l1 and by 0.005 in KS, with the same random numbers."""
     fade: float = 1.5
-    """Distance from which all is distant, over that up to which all is near. The energy of
-    fixed magnets that fly apart is off by a fifth of what it is with 1.25."""
+    """Distance from which all is distant, over that up to which all is near. Measured: the energy
+    of fixed magnets that fly apart is off by a fifth of what it is with 1.25."""
 
 
 STEPPING: Final = SteppingPolicy()
@@ -83,19 +83,20 @@ class PullPolicy(NamedTuple):
     """Where a table ends, and how steep it may be for the time step."""
 
     least_force_N: float = 1e-5
-    """Force at the automatic cut-off; a hundredth of the drag at 6 cm/s of slip."""
+    """Force at the automatic cut-off; a hundredth of the drag at 6 cm/s of slip; chosen by hand."""
     taper: float = 0.8
     """Share of the cut-off beyond which the force is led to 0; chosen by hand."""
     stiffness: float = 0.5
-    """Most of 4 F' dt² / m; at 2 two blocks that turn about each other no longer keep an orbit, and
-    at a quarter of that first contacts are within 1 % of those of a small step."""
+    """Most of 4 F' dt² / m; measured: at 2 two blocks that turn about each other no longer keep an
+    orbit, and at a quarter of that first contacts are within 1 % of those of a small step."""
     resistance: float = 0.25
-    """Most of k dt / (gap m) of the resistance at close approach; stable below 1."""
+    """Most of k dt / (gap m) of the resistance at close approach; stable below 1 in closed form, a
+    quarter by hand."""
     angles: int = 36
-    """Directions and angles of a table of oriented faces, a multiple of 4: of magnets of 5 mm, 9 mm
-    apart, forces and torques are within 0.2 % (rms) of the largest."""
+    """Directions and angles of a table of oriented faces, a multiple of 4: measured on magnets of 5
+    mm, 9 mm apart, forces and torques are within 0.2 % (rms) of the largest."""
     distance_step: float = 0.07
-    """Step of the logarithm of its distance; chosen by the same comparison."""
+    """Step of the logarithm of its distance; measured in the same comparison."""
 
 
 POLICY: Final = PullPolicy()
@@ -337,21 +338,7 @@ def _stepped(
     tables: PullTables, faces: RadialForce, others: list[float], *,
     nearest: float, mass: float, step: float,
 ) -> PullTables:  # fmt: skip
-    """Part the force of two faces; where it is near up to its end, all acts in each step.
-
-    Parameters
-    ----------
-    tables : PullTables
-        The tables without steps of their own.
-    faces : RadialForce
-        Attraction of the faces.
-    others : list of float
-        How far the other forces reach [m], which act in each step.
-    nearest : float
-        Least distance from which all may be distant [m].
-    mass, step : float
-        Mass of a block with the water that it moves [kg], and time step [s].
-    """
+    """Part the force of two faces; where it is near up to its end, all acts in each step."""
     reach = np.geomspace(nearest, faces.cutoff, 2000)
     curved = np.abs(np.gradient(faces(reach), reach)) * 4.0 * (STEPPING.every * step) ** 2 / mass
     near = float(reach[np.flatnonzero(np.append(True, curved[:-1] > STEPPING.stiffness))[-1]])
@@ -495,7 +482,7 @@ def _oriented(energy: Energy, contact: float, end: float, *, of_magnets: bool) -
 
 
 SHOWN_GAP_M: Final = 0.010
-"""Gap at which the force is stated: an easy one to set with a spacer."""
+"""Gap at which the force is stated: an easy one to set with a spacer; chosen by hand."""
 CURVE_POINTS: Final = 400
 """Gaps of the curve, smooth to the eye; chosen by hand."""
 

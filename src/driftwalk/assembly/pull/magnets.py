@@ -23,8 +23,8 @@ from driftwalk.model.interaction import Magnet
 MU_0: Final = 1.25663706127e-6
 """Permeability of the vacuum [N/A²], CODATA 2022."""
 NODES: Final = 12
-"""Points of the quadrature along an edge of a pole face, of magnets that are close; 24 change no
-force by 1e-3 as close as half the thickness."""
+"""Points of the quadrature along an edge of a pole face, of magnets that are close; measured: 24
+change no force by 1e-3 as close as half the thickness."""
 
 
 def magnet_energy(
@@ -136,7 +136,7 @@ class MultipolePolicy(NamedTuple):
     """Where the closed form holds; lengths in largest sides of the magnet."""
 
     nearest: float = 2.5
-    """Least distance of the fit; there the energy is within 1.2 % of the largest."""
+    """Least distance of the fit; measured: there the energy is within 1.2 % of the largest."""
     farthest: float = 16.0
     """Largest distance of the fit; beyond, the closed form is extrapolated."""
     softening: float = 0.1

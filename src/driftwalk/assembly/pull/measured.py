@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -20,13 +20,20 @@ UNITS: Final = {
     "torque": {"N_m": 1.0, "mN_m": 1e-3, "N_mm": 1e-3, "uN_m": 1e-6},
 }
 """Columns of the table, and the factors of their units to SI."""
-TORQUE_AGREES: Final = 0.1
-"""Share of the largest torque by which a stated torque may differ from the one that the force
-implies; a balance and a lever measure within some per cent."""
 
-BEHIND_M: Final = (0.003, 0.01)
-"""Where the energy behind a face begins to fade, and where it ends: deeper than two blocks overlap,
-and before the next face of a block of 3 cm; chosen by hand."""
+
+class MeasuredPullPolicy(NamedTuple):
+    """When a measured table contradicts itself, and where it ends."""
+
+    torque_agrees: float = 0.1
+    """Share of the largest torque by which a stated torque may differ from the one that the force
+    implies: a balance and a lever measure within some per cent. Chosen by hand."""
+    behind_m: tuple[float, float] = (0.003, 0.01)
+    """Where the energy behind a face begins to fade, and where it ends: deeper than two blocks
+    overlap, and before the next face of a block of 3 cm; chosen by hand."""
+
+
+MEASURED_PULL: Final = MeasuredPullPolicy()
 
 
 @dataclass(frozen=True)
@@ -134,7 +141,8 @@ class MeasuredAttraction:
         if self.axes[2][0] >= 0.0:
             angle = np.abs(angle)
         used = [k for k, axis in enumerate(self.axes) if len(axis) > 1]
-        part = np.clip((-x - BEHIND_M[0]) / (BEHIND_M[1] - BEHIND_M[0]), 0.0, 1.0)
+        begin, end = MEASURED_PULL.behind_m
+        part = np.clip((-x - begin) / (end - begin), 0.0, 1.0)
         gap = x if len(self.axes[1]) > 1 else np.hypot(x, y)
         gap = np.maximum(gap, self.axes[0][0])
         points = np.stack(np.broadcast_arrays(gap, y, angle), axis=-1)
@@ -251,7 +259,7 @@ def _require_conservative(path: str | Path, found: MeasuredAttraction, torque: F
         return
     implied = -np.gradient(found.energies(), np.asarray(found.axes[2]), axis=2)
     apart = float(np.abs(torque - implied)[..., 1:-1].max())
-    if apart > TORQUE_AGREES * max(float(np.abs(torque).max()), 1e-300):
+    if apart > MEASURED_PULL.torque_agrees * max(float(np.abs(torque).max()), 1e-300):
         raise FormatError(
             f"the torque differs by up to {1e6 * apart:.3g} µN m from the one that the "
             "forces imply (minus the derivative of their energy by the angle, counter-clockwise): "

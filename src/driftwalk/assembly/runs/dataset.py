@@ -60,6 +60,7 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
     study = plan.study
     replayed = replay_of(plan, arrays)
     broken = (arrays["status"].astype(np.int64) & BROKEN) != 0
+    # A broken world has no class, whatever its events say.
     outcome = np.where(broken, np.int32(-1), replayed.outcome)
     by_event, by_side, by_block = ("run", "event"), ("run", "event", "side"), ("run", "block")
     whole = {name: array.astype(np.int32) for name, array in arrays.items() if "pose" not in name}

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 RUNS_PER_FLOW: Final = 25
-"""Runs that share a drawn flow: each drawn one has to be prepared for the core."""
+"""Runs that share a drawn flow: each drawn one has to be prepared for the core; chosen by hand."""
 PLAIN: Final = {"drag_power": "drag_power", "force_memory": "force_memory_s"}
 """Numbers of a law that [forces] holds as they are, by the fit's name for them."""
 PARAMETERS: Final = ("ln_drag_coefficient", "ln_noise_intensity", "linear_share", *PLAIN)

@@ -199,6 +199,7 @@ def assemble_drawn(
         threads=threads_of_unit(threads, executor),
     )
     settings = plan.study.assembly
+    # The draws of run k depend on these alone, not on how the runs are shared out to workers.
     address = {"runs": settings.runs, "seed": settings.seed, "trial": trial}
     drawn = draw_parameters(calibration, **address)
     is_fit = kind_name(calibration) == "fit"

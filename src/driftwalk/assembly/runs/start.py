@@ -13,12 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.lattice.polyomino import STEPS
 from driftwalk.assembly.outcomes.outcome_classes import overlap_depth
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.schema.shapes import cells_of_shape
+from driftwalk.schema.shapes import STEPS, cells_of_shape
 from driftwalk.simulation.backend import wall_depth
 
 if TYPE_CHECKING:
@@ -132,7 +131,7 @@ def _parent(order: list[tuple[int, int]], cell: tuple[int, int]) -> tuple[int, i
 
 
 TOUCHING_M = 1e-9
-"""Depth up to which blocks and walls may touch at the start [m]."""
+"""Depth up to which blocks and walls may touch at the start [m]; chosen by hand."""
 
 
 def require_room(study: Study) -> None:

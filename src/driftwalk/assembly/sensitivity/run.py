@@ -322,7 +322,6 @@ def map_dataset(
 
 
 def _map_classes(settings: Settings, outcomes: Outcomes, reference: xr.Dataset) -> tuple[str, ...]:
-    """Return the classes of all settings and of the reference, in order."""
     first = settings.worlds[0].study.assembly
     other = reference.attrs.get("chirality", first.chirality)
     if other != first.chirality:

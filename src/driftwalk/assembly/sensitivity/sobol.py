@@ -283,12 +283,7 @@ def _estimates(groups: Floats) -> Floats:
     """Return first and total order indices, shape (2, resample, input), of at least two resamples.
 
     To SciPy every resample is a separate output: its bootstrap takes no seed. One that happens
-    to hold a single value has indices of 0.
-
-    Parameters
-    ----------
-    groups : ndarray, shape (resample, sample, input + 2)
-        One output at the settings of each group of the design.
+    to hold a single value has indices of 0. `groups`: shape (resample, sample, input + 2).
     """
     from scipy.stats import sobol_indices as indices_of
 

@@ -25,7 +25,7 @@ Courses = dict[str, Integers]
 """By class, the number of runs that are in it at each of the times; classes that occur."""
 
 TIMES: Final = 101
-"""Times of the grid, from the start of the runs to their end."""
+"""Times of the grid, from the start of the runs to their end; chosen by hand."""
 OTHER: Final = "other"
 DIMS: Final = ("time", "class_over_time")
 

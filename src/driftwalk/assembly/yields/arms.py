@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 RUNS_OF_UNIT: Final = 64
-"""Runs that a work unit has at least: fewer leave lanes of the native core empty."""
+"""Runs that a work unit has at least: fewer leave lanes of the native core empty; chosen by
+hand."""
 Stores = Callable[[str, Mapping[str, Any]], Store]
 Ranges = Mapping[str, tuple[float, float]]
 

@@ -172,6 +172,7 @@ def maximise_yield(
         budget=SELECTION.most * runs,
     )  # fmt: skip
     before = chosen.done
+    # A setting that was chosen for its runs was lucky in them: its yield comes from others.
     reported = Runs(arms, name, moment, trial=FIRST_TRIALS.fresh, name="fresh", **how)
     some = [selected.best, *selected.alike[: YIELD_POLICY.alike], *_front(chosen, known)]
     reported.tally.extend(list(dict.fromkeys(some)), fresh_runs)
@@ -321,6 +322,7 @@ def yield_dataset(
     sizes, reached = (np.array([one(arm) for arm in kept]) for one in (tally.size, tally.reached))
     fresh, again = (np.array([one(arm) for arm in kept]) for one in (judge.size, judge.reached))
     shown = again / np.maximum(fresh, 1), *proportion_interval(again, fresh, confidence=confidence)
+    # All settings are compared with the best one: the intervals share one error (Bonferroni).
     level = (1.0 - confidence) / 2 / max(len(kept) - 1, 1)
     apart = [tally.difference(selected.best, arm) for arm in kept]
     behind = np.array([one.mean for one in apart])

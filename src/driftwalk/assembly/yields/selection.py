@@ -30,7 +30,8 @@ class SelectionPolicy(NamedTuple):
     most: int = 4
     """Runs that distinguish at most, in budgets of halving: `studies/yield` needs 1 to 4."""
     tuned_runs: int = 2000
-    """Runs at which the confidence sequence is narrowest: those of a last round of halving."""
+    """Runs at which the confidence sequence is narrowest: those of a last round of halving; chosen
+    by hand."""
 
 
 SELECTION: Final = SelectionPolicy()
@@ -220,13 +221,15 @@ class SearchPolicy(NamedTuple):
     points: int = 16
     """Settings that begin, of Sobol's sequence, a power of two; chosen by hand."""
     first_step: float = 0.25
-    """First step, of the range: about the distance of 16 points in two dimensions."""
+    """First step, of the range: about the distance of 16 points in two dimensions; chosen by
+    hand."""
     last_step: float = 0.03
     """Steps below this share of the range are not taken; chosen by hand, three halvings."""
     runs: int = 250
-    """Runs of a setting at the first step; doubled with every halving, for smaller gains."""
+    """Runs of a setting at the first step; doubled with every halving, for smaller gains; chosen by
+    hand."""
     digits: int = 4
-    """Digits of a setting: more than anyone can set."""
+    """Digits of a setting: more than anyone can set; chosen by hand."""
 
 
 SEARCH: Final = SearchPolicy()

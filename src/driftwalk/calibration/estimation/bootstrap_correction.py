@@ -42,7 +42,7 @@ def bootstrap_estimates(
     ]
     discrepancies = np.array([one.discrepancy for one in found])
     # Of fewer, a bias and a scatter would be chance; the covariance's own error stands in.
-    if len(found) < 40:
+    if len(found) < POSTERIOR.fewest_estimates:
         none = np.zeros(sample.shape[1])
         return BootstrapEstimates(discrepancies, none, none + emulator.widening)
     errors = np.array([one.setting for one in found]) - chosen

@@ -37,16 +37,18 @@ class MatchingPolicy(NamedTuple):
     most_starts: int = 2
     """Other starts that are tried. Chosen by hand, a bound on the time."""
     matches: float = 1.25
-    """Discrepancy per summary up to which no other start is tried."""
+    """Discrepancy per summary up to which no other start is tried; chosen by hand."""
     apart: float = 0.04
     """Least root-mean-square distance of two starts, in parts of the ranges. Chosen by hand."""
     hopeless: float = 100.0
-    """Discrepancy per summary from which on another start is no use: it is another model."""
+    """Discrepancy per summary from which on another start is no use: it is another model; chosen by
+    hand."""
     unsettled: float = 1.0
-    """Last move of a mean, in standard deviations, above which it is not determined."""
+    """Last move of a mean, in standard deviations, above which it is not determined; chosen by
+    hand."""
     unlike: float = 4.0
     """Discrepancy, in medians of the model's own, above which nothing is determined: intervals
-    would be more than twice as wide. A wrong model on a recorded mouse had 30."""
+    would be more than twice as wide. Measured: a wrong model on a recorded mouse had 30."""
     as_close: float = 1.25
     """Factor by which the summaries' answer may be farther in the six distances. Chosen by hand."""
 

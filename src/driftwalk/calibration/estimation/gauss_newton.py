@@ -23,33 +23,39 @@ class GaussNewtonPolicy(NamedTuple):
     """
 
     per_coefficient: tuple[int, int] = (4, 16)
-    """Simulations for each coefficient of an emulator: in a trust region, and for the posterior."""
+    """Simulations for each coefficient of an emulator: in a trust region, and for the posterior;
+    chosen by hand."""
     fewest_simulations: tuple[int, int] = (256, 512)
-    """Fewest simulations: they also give the covariance of a hundred summaries."""
+    """Fewest simulations: they also give the covariance of a hundred summaries; chosen by hand."""
     fewest_rounds: int = 3
-    """Rounds before a search settles or is given up. A true model is close after two or three."""
+    """Rounds before a search settles or is given up. A true model is close after two or three;
+    chosen by hand."""
     most_rounds: int = 12
-    """A bound on the time."""
+    """A bound on the time; chosen by hand."""
     most_in_vain: int = 4
-    """Rounds without a better fit after which the search ends."""
+    """Rounds without a better fit after which the search ends; chosen by hand."""
     reach: float = 1.25
-    """A solution may lie this far from the centre, in half-widths of the trust region."""
+    """A solution may lie this far from the centre, in half-widths of the trust region; chosen by
+    hand."""
     inside: float = 0.8
-    """A search settles on solutions within this part of the trust region."""
+    """A search settles on solutions within this part of the trust region; chosen by hand."""
     widest: float = 0.15
-    """Largest half-width, in parts of the ranges: a quadratic does not hold in more."""
+    """Largest half-width, in parts of the ranges: a quadratic does not hold in more; chosen by
+    hand."""
     narrowest: float = 0.01
-    """Smallest half-width, in parts of the ranges."""
+    """Smallest half-width, in parts of the ranges; chosen by hand."""
     wide_stds: float = 4.0
-    """Half-width in standard deviations of the solution."""
+    """Half-width in standard deviations of the solution; chosen by hand."""
     shrinks: tuple[float, float] = (0.35, 0.8)
-    """Strongest shrinkage per round: of a solution inside, and outside."""
+    """Strongest shrinkage per round: of a solution inside, and outside; chosen by hand."""
     grows: float = 1.5
-    """Strongest growth per round."""
+    """Strongest growth per round; chosen by hand."""
     settled: float = 0.7
-    """A search has settled when the next trust region is at least this part of the last."""
+    """A search has settled when the next trust region is at least this part of the last; chosen by
+    hand."""
     typical: float = 1.4
-    """Discrepancy per summary below which a search may settle; the true model has 0.7 to 1.2."""
+    """Discrepancy per summary below which a search may settle; the true model has 0.7 to 1.2;
+    chosen by hand."""
 
 
 GAUSS_NEWTON: Final = GaussNewtonPolicy()

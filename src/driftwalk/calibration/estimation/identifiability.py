@@ -21,12 +21,13 @@ class DeterminedPolicy(NamedTuple):
     """When a recording determines a parameter (`studies/motion_models/recover.py`)."""
 
     most_half_width: float = 0.15
-    """Half-width over the value: half of the answers are then within 6 % of the truth. With a
-    quarter, the median error of some parameters exceeded a tenth."""
+    """Half-width over the value: half of the answers are then within 6 % of the truth. Measured
+    (studies/motion_models): with a quarter, the median error of some parameters exceeded a
+    tenth."""
     confidence: float = 0.9
-    """The confidence of the interval that is judged."""
+    """The confidence of the interval that is judged; by convention that of a calibration."""
     small_part: float = 0.05
-    """On a linear scale, values near 0 count as large as this part of the range."""
+    """On a linear scale, values near 0 count as large as this part of the range; chosen by hand."""
     range_end: float = 0.01
     """An answer within this part of a range of its end is called open. Chosen by hand."""
 

@@ -34,11 +34,14 @@ class RegionPolicy(NamedTuple):
     """How large the region is that is simulated for a posterior sample. Chosen by hand."""
 
     spread: float = 1.5
-    """Standard deviation of the settings along every axis, in those of the sample."""
+    """Standard deviation of the settings along every axis, in those of the sample; chosen by
+    hand."""
     widest: float = 0.3
-    """Largest half-width, in parts of the ranges: an emulator does not hold in more."""
+    """Largest half-width, in parts of the ranges: an emulator does not hold in more; chosen by
+    hand."""
     narrowest: float = 0.003
-    """Smallest standard deviation, in parts of the ranges: keeps the covariance regular."""
+    """Smallest standard deviation, in parts of the ranges: keeps the covariance regular; chosen by
+    hand."""
 
 
 REGION: Final = RegionPolicy()
@@ -117,25 +120,36 @@ class PosteriorPolicy(NamedTuple):
     """
 
     size: int = 512
-    """Settings of the posterior sample."""
+    """Settings of the posterior sample; chosen by hand."""
     walkers: int = 64
-    """Walkers of the chain: several for each of at most a dozen parameters."""
+    """Walkers of the chain: several for each of at most a dozen parameters; chosen by hand."""
     steps: int = 600
-    """Steps of each walker; the first half is left out."""
+    """Steps of each walker; the first half is left out; chosen by hand."""
     begin: float = 0.3
-    """Walkers begin within this part of the standard deviations of the solution."""
+    """Walkers begin within this part of the standard deviations of the solution; chosen by hand."""
     inner: float = 0.9
-    """Walkers begin within this part of the region."""
+    """Walkers begin within this part of the region; chosen by hand."""
     most_rounds: int = 8
-    """A bound on the time."""
+    """A bound on the time; chosen by hand."""
     stays: float = 0.5
-    """A mean that moves by less, in standard deviations, has come to rest."""
+    """A mean that moves by less, in standard deviations, has come to rest; chosen by hand."""
     alike: float = 1.3
-    """Largest growth of a standard deviation at rest; a sample cut off by a region grows by 1.5."""
+    """Largest growth of a standard deviation at rest; chosen by hand, as a sample cut off by a
+    region grows by 1.5."""
     reach: float = 1.0
-    """A solution lies within the box about the region."""
+    """A solution lies within the box about the region; chosen by hand."""
     near: float = 1.1
-    """Earlier simulations within this part of a region count for its emulator."""
+    """Earlier simulations within this part of a region count for its emulator; chosen by hand."""
+    fewest_estimates: int = 40
+    """Estimates of simulated recordings without which their bias and scatter would be chance."""
+    many: float = 1.5
+    """Simulations near a region, in halves of those of a round, from which on it may be at rest;
+    chosen by hand."""
+    as_wide: float = 0.99
+    """Part of the widest region from which on one counts as that wide; chosen by hand."""
+    behind: float = 10.0
+    """Deviance by which a mode is behind when it is ruled out; chosen by hand, as covariances come
+    from simulations: a discrepancy of a hundred has an error of some 5."""
 
 
 POSTERIOR: Final = PosteriorPolicy()
@@ -186,7 +200,7 @@ def sample_posterior(
         sample = _chain(emulator, region, recorded[0], solution, seed + number + 1)
         moved = sample.mean(axis=0) - region.centre
         std = sample.std(axis=0)
-        enough = np.count_nonzero(near) >= 1.5 * half
+        enough = np.count_nonzero(near) >= POSTERIOR.many * half
         if enough and _stayed(moved, std, region):
             break
         if number < POSTERIOR.most_rounds - 1:
@@ -199,7 +213,9 @@ def _stayed(moved: Floats, std: Floats, region: Region) -> bool:
 
     A parameter along which the region cannot grow is as wide as it will be.
     """
-    alike = (std < POSTERIOR.alike * region.std) | (region.width > 0.99 * REGION.widest)
+    alike = (std < POSTERIOR.alike * region.std) | (
+        region.width > POSTERIOR.as_wide * REGION.widest
+    )
     return bool((np.abs(moved) < POSTERIOR.stays * std).all() and alike.all())
 
 
@@ -280,9 +296,8 @@ def find_modes(
         if not any(_reaches(one, posterior.sample.mean(axis=0)) for one in found):
             found.append(posterior)
     deviance = np.array([_deviance(one) for one in found])
-    # The covariances come from simulations: a discrepancy of a hundred has an error of some 5. So
-    # a place is ruled out only where it is behind by 10.
-    order = [k for k in np.argsort(deviance, kind="stable") if deviance[k] - deviance.min() < 10.0]
+    behind = deviance - deviance.min()
+    order = [k for k in np.argsort(deviance, kind="stable") if behind[k] < POSTERIOR.behind]
     weights = np.exp(-0.5 * (deviance[order] - deviance.min()))
     return Modes(tuple(found[place] for place in order), weights / weights.sum())
 

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.estimation.synthetic_likelihood import CONSTANT
+from driftwalk.calibration.estimation.synthetic_likelihood import SYNTHETIC
 from driftwalk.calibration.evolution import rounded
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
@@ -27,19 +27,24 @@ class RegressionPolicy(NamedTuple):
     """Sequential regression from the whole ranges to a trust region. Chosen by hand."""
 
     simulations: int = 256
-    """Simulations of a round: some two for each of a hundred summaries, a power of two."""
+    """Simulations of a round: some two for each of a hundred summaries, a power of two; chosen by
+    hand."""
     most_rounds: int = 6
-    """A bound on the time."""
+    """A bound on the time; chosen by hand."""
     wide_errors: float = 2.5
-    """Half-width of the next box in standard errors: 99 % of a normal law."""
+    """Half-width of the next box in standard errors: chance goes beyond it once in a hundred."""
     narrow: float = 0.05
-    """Errors, in parts of the ranges, at which a quadratic holds in the box."""
+    """Errors, in parts of the ranges, at which a quadratic holds in the box; chosen by hand."""
     lost: float = 0.2
-    """Larger errors say next to nothing: a uniform distribution has 0.29."""
+    """Larger errors say next to nothing: a uniform distribution has 0.29 in closed form."""
     ridges: tuple[float, ...] = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
-    """Ridge penalties that are tried; each parameter takes that of the least error."""
+    """Ridge penalties that are tried; each parameter takes that of the least error; chosen by
+    hand."""
     bounded: float = 2.0
-    """Summaries count as at most this many standard deviations from the usual."""
+    """Summaries count as at most this many standard deviations from the usual; chosen by hand."""
+    as_large: float = 0.9
+    """Part of the last errors above which errors no longer shrink, and the rounds end; chosen by
+    hand."""
 
     @property
     def most_simulations(self) -> int:
@@ -90,7 +95,7 @@ def sequential_regression(
         before, regression = regression, _ridge_regression(settings, summaries, recorded)
         if regression.error.max() < REGRESSION.narrow or (number and not regression.found):
             break
-        if number and (regression.error > 0.9 * before.error).all():
+        if number and (regression.error > REGRESSION.as_large * before.error).all():
             break
         reach = REGRESSION.wide_errors * regression.error
         low = np.clip(regression.centre - reach, 0.0, 1.0 - REGRESSION.narrow)
@@ -100,7 +105,9 @@ def sequential_regression(
 
 def _require_change(summaries: Floats) -> None:
     """Refuse a model that moves in the same way whatever its parameters and random numbers are."""
-    varies = np.ptp(summaries, axis=0) > CONSTANT * (np.abs(summaries).max(axis=0) + CONSTANT)
+    varies = np.ptp(summaries, axis=0) > SYNTHETIC.constant * (
+        np.abs(summaries).max(axis=0) + SYNTHETIC.constant
+    )
     if not varies.any():
         raise InputError(
             "the model moves in the same way at all settings of its parameters: check that it uses "

@@ -52,6 +52,8 @@ if TYPE_CHECKING:
 
 
 SEARCH: Final = Budget(design=256, starts=3, short=20, long=30, replicates=2, retest=8)
+"""Budget of the search that gives the summaries a start; smaller than the default, whose answer
+counts. Chosen by hand."""
 
 
 @one_blas_thread()

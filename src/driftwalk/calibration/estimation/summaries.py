@@ -31,7 +31,8 @@ Instants = Callable[[Floats], Bools]
 """Which instants [s] count."""
 
 SMALLEST: Final = 0.02
-"""Logarithms of step lengths begin at this part of the usual step: a rest has one, too."""
+"""Logarithms of step lengths begin at this part of the usual step: a rest has one, too; chosen by
+hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,25 +145,25 @@ class SummaryPolicy(NamedTuple):
     """
 
     step_quantiles: tuple[float, ...] = (0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98)
-    """Of the logarithm of step lengths."""
+    """Of the logarithm of step lengths; chosen by hand."""
     longer_quantiles: tuple[float, ...] = (0.05, 0.25, 0.5, 0.75, 0.95)
-    """Of steps over longer intervals, and of changes of speed."""
+    """Of steps over longer intervals, and of changes of speed; chosen by hand."""
     memory_lags: tuple[int, ...] = (1, 2, 3, 5, 10, 20, 50)
-    """Of autocorrelations, in step intervals."""
+    """Of autocorrelations, in step intervals; chosen by hand."""
     displacement_lags: tuple[int, ...] = (1, 3, 10, 30, 100)
-    """Of mean squared displacements, in step intervals."""
+    """Of mean squared displacements, in step intervals; chosen by hand."""
     wall_quantiles: tuple[float, ...] = (0.05, 0.25, 0.5, 0.75)
-    """Of the distance from the wall."""
+    """Of the distance from the wall; chosen by hand."""
     wall_edges: tuple[float, ...] = (0.05, 0.15, 0.4)
-    """Ends of zones from the wall inwards, in parts of the largest distance."""
+    """Ends of zones from the wall inwards, in parts of the largest distance; chosen by hand."""
     speed_levels: tuple[float, ...] = (0.3, 0.7, 1.2)
-    """Speeds that separate fast bouts from slow ones, in usual steps."""
+    """Speeds that separate fast bouts from slow ones, in usual steps; chosen by hand."""
     faster: float = 0.4
-    """Rise of the logarithm of the speed that counts as faster; slower likewise."""
+    """Rise of the logarithm of the speed that counts as faster; slower likewise; chosen by hand."""
     steady: float = 0.1
-    """Change of the logarithm of the speed below which it is steady."""
+    """Change of the logarithm of the speed below which it is steady; chosen by hand."""
     straight: float = 0.3
-    """Turns [rad] above this count alike: the mean is of small turns."""
+    """Turns [rad] above this count alike: the mean is of small turns; chosen by hand."""
     fewest: int = 4
     """Fewest values of a mean; of fewer it would be chance and counts as 0."""
 
@@ -338,7 +339,8 @@ def _bouts(one: Series, level: float) -> Numbers:
 
 
 ALIKE: Final = 16
-"""Settings in a row that are seen by one camera. So many points of a Sobol' sequence fill a box."""
+"""Settings in a row that are seen by one camera. So many points of a Sobol' sequence fill a box;
+chosen by hand."""
 POINT: Final = "point"
 """Settings of a unit, in the unit cube; they travel with it."""
 

@@ -23,10 +23,22 @@ from driftwalk.core.arrays import Bools, Floats
 Form = Literal["slopes", "squares", "products"]
 FORMS: Final[tuple[Form, ...]] = ("slopes", "squares", "products")
 """A plane, with the square of each parameter, and with the products of two."""
-SHRUNK: Final = 0.05
-"""Part of the correlations of the summaries that is taken away: they come from simulations."""
-CONSTANT: Final = 1e-9
-"""A summary that varies by less than this part of its size says nothing."""
+
+
+class SyntheticLikelihoodPolicy(NamedTuple):
+    """How mean and covariance of the summaries come from simulations."""
+
+    shrunk: float = 0.05
+    """Part of the correlations of the summaries that is taken away: they come from simulations.
+    Chosen by hand."""
+    constant: float = 1e-9
+    """A summary that varies by less than this part of its size says nothing. Chosen by hand: far
+    above the rounding of float64."""
+    simulations: int = 512
+    """That give mean and covariance: some four for each summary. Chosen by hand."""
+
+
+SYNTHETIC: Final = SyntheticLikelihoodPolicy()
 
 
 class Solution(NamedTuple):
@@ -176,7 +188,7 @@ def fit_emulator(
     left = summaries - basis @ coefficients
     freedom = max(len(settings) - basis.shape[1], 1)
     spread = np.sqrt((left**2).sum(axis=0) / freedom)
-    used = spread > CONSTANT * (np.abs(summaries).max(axis=0) + CONSTANT)
+    used = spread > SYNTHETIC.constant * (np.abs(summaries).max(axis=0) + SYNTHETIC.constant)
     scaled = left[:, used] / spread[used]
     correlation = shrunk_correlation(scaled, freedom)
     whitening = np.linalg.cholesky(np.linalg.inv(correlation)).T / spread[used]
@@ -193,7 +205,8 @@ def shrunk_correlation(scaled: Floats, freedom: int) -> Floats:
     >>> shrunk_correlation(np.array([[1.0, 1.0], [-1.0, -1.0]]), 2).round(2).tolist()
     [[1.0, 0.95], [0.95, 1.0]]
     """
-    return (1.0 - SHRUNK) * (scaled.T @ scaled) / freedom + SHRUNK * np.eye(scaled.shape[1])
+    one = np.eye(scaled.shape[1])
+    return (1.0 - SYNTHETIC.shrunk) * (scaled.T @ scaled) / freedom + SYNTHETIC.shrunk * one
 
 
 def _best_form(place: Floats, summaries: Floats) -> Form:
@@ -216,7 +229,7 @@ def _foretold(basis: Floats, summaries: Floats) -> float:
     own = np.minimum((orthogonal**2).sum(axis=1), 0.99)
     left = (summaries - orthogonal @ (orthogonal.T @ summaries)) / (1.0 - own)[:, None]
     spread = left.std(axis=0)
-    used = spread > CONSTANT * (np.abs(summaries).max(axis=0) + CONSTANT)
+    used = spread > SYNTHETIC.constant * (np.abs(summaries).max(axis=0) + SYNTHETIC.constant)
     return float(np.log(spread[used]).mean()) if used.any() else 0.0
 
 
@@ -247,10 +260,6 @@ def _basis_slope(place: Floats, form: Form) -> Floats:
     return np.concatenate(rows)
 
 
-SIMULATIONS: Final = 512
-"""That give mean and covariance: some four for each summary."""
-
-
 class SyntheticLikelihood(NamedTuple):
     """Summaries of a recording, compared with those of simulations of one setting."""
 
@@ -277,11 +286,13 @@ def synthetic_likelihood_at(
     >>> round(found.discrepancy), bool(found.discrepancy > usual)
     (9, True)
     """
-    seen = simulate(np.tile(setting, (SIMULATIONS + replicates, 1)))
-    known, others = seen[:SIMULATIONS], seen[SIMULATIONS:]
+    seen = simulate(np.tile(setting, (SYNTHETIC.simulations + replicates, 1)))
+    known, others = seen[: SYNTHETIC.simulations], seen[SYNTHETIC.simulations :]
     mean = known.mean(axis=0)
     spread = np.sqrt(known.var(axis=0, ddof=1))
-    root = np.linalg.cholesky(shrunk_correlation((known - mean) / spread, SIMULATIONS - 1))
+    root = np.linalg.cholesky(
+        shrunk_correlation((known - mean) / spread, SYNTHETIC.simulations - 1)
+    )
     apart = np.linalg.solve(root, ((np.vstack([recorded, others]) - mean) / spread).T)
     discrepancies = (apart**2).sum(axis=0)
     return SyntheticLikelihood(

@@ -51,17 +51,21 @@ class BootstrapPolicy(NamedTuple):
     """
 
     surface_intervals: tuple[int, int] = (32, 10)
-    """Intervals along an axis, with one and with two parameters."""
+    """Intervals along an axis, with one and with two parameters; chosen by hand."""
     least_bandwidth_steps: float = 1.5
-    """Least bandwidth in steps: a quadratic needs three settings along each axis."""
+    """Least bandwidth in steps: a quadratic needs three settings along each axis; chosen by
+    hand."""
     retained_floors: float = 1.5
-    """Height above the minimum, in floors, below which places are retained."""
+    """Height above the minimum, in floors, below which places are retained; chosen by hand."""
     surface_replicates: int = 4
-    """Simulations of every setting; a recording meets one of them, in turn."""
+    """Simulations of every setting; a recording meets one of them, in turn; chosen by hand."""
     recordings_per_unit: int = 10
-    """Recordings of a work unit; all of a unit meet the same replicate."""
+    """Recordings of a work unit; all of a unit meet the same replicate; chosen by hand."""
     floor_references: int = 8
-    """Recordings whose distances to the others give the noise floor."""
+    """Recordings whose distances to the others give the noise floor; chosen by hand."""
+    supported: float = 0.99
+    """Sum of the weights of a place above which its settings say what the surface is there: it is 1
+    but for rounding where they do; the tolerance by hand."""
 
 
 BOOTSTRAP: Final = BootstrapPolicy()
@@ -123,7 +127,7 @@ def build_surface(problem: Problem, refined: RefinedMap) -> StoredSurface:
     simulated = binary_dilation(low, structure=np.ones((3,) * low.ndim, dtype=np.bool_))
     smoother = make_smoother(axes, bandwidth=bandwidth, weights=simulated.astype(float))
     # Weights add up to 1 wherever there are settings to say what the surface is.
-    supported = smoother.matrix.sum(axis=1).reshape(height.shape) > 0.99
+    supported = smoother.matrix.sum(axis=1).reshape(height.shape) > BOOTSTRAP.supported
     retained = (height <= BOOTSTRAP.retained_floors) & supported
     cells = np.flatnonzero(simulated)
     settings = [values.ravel()[cells] for values in np.meshgrid(*axes, indexing="ij")]

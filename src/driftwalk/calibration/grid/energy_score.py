@@ -32,9 +32,9 @@ from driftwalk.calibration.grid.grid_map import Map
 from driftwalk.core.arrays import Floats
 
 FINENESS = 4
-"""Lattice points per cell of a grid along each axis."""
+"""Lattice points per cell of a grid along each axis; chosen by hand."""
 REACH = 2.0
-"""How far the cells are that count, in bandwidths."""
+"""How far the cells are that count, in bandwidths; chosen by hand."""
 
 
 class Optimum(NamedTuple):

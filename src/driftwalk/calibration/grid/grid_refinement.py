@@ -31,30 +31,36 @@ class RefinementPolicy(NamedTuple):
     """
 
     locating_intervals: tuple[int, int] = (24, 12)
-    """Intervals along an axis of a locating window, with one and with two parameters."""
+    """Intervals along an axis of a locating window, with one and with two parameters; chosen by
+    hand."""
     most_intervals: tuple[int, int] = (96, 18)
-    """Most intervals along an axis of the refined map. Its time grows with their product."""
+    """Most intervals along an axis of the refined map. Its time grows with their product; chosen by
+    hand."""
     step_tolerance: float = 1.3
-    """A step may exceed the wanted one by this factor before a window is mapped again."""
+    """A step may exceed the wanted one by this factor before a window is mapped again; chosen by
+    hand."""
     most_windows: int = 6
-    """Most locating windows: a bound on the time."""
+    """Most locating windows: a bound on the time; chosen by hand."""
     locating_replicates: int = 2
     """Fewest replicates from which the floor of a setting can be measured."""
     bandwidth_steps: float = 2.0
-    """Least bandwidth of the surface, in steps. Wider ones shift the minimum to the flatter
-    side."""
+    """Least bandwidth of the surface, in steps. Wider ones shift the minimum to the flatter side;
+    chosen by hand."""
     bandwidth_share: float = 0.125
-    """Least bandwidth of the surface, as a share of the window."""
+    """Least bandwidth of the surface, as a share of the window; chosen by hand."""
     plausible_floors: float = 1.25
-    """Height above the minimum, in floors, below which a setting is plausible."""
+    """Height above the minimum, in floors, below which a setting is plausible; chosen by hand."""
     padding: float = 0.2
-    """A window exceeds the plausible settings by this share of their extent on each side."""
+    """A window exceeds the plausible settings by this share of their extent on each side; chosen by
+    hand."""
     smaller: float = 0.6
-    """A window is replaced by one at most this share of its extent along an axis."""
+    """A window is replaced by one at most this share of its extent along an axis; chosen by
+    hand."""
     false_alarm_rate: float = 1e-3
     """Share of maps in which chance alone makes a setting better than the optimum."""
     retained_floors: float = 0.8
-    """Height above the minimum, in floors, below which settings get all replicates."""
+    """Height above the minimum, in floors, below which settings get all replicates; chosen by
+    hand."""
 
 
 REFINEMENT: Final = RefinementPolicy()

@@ -19,7 +19,7 @@ from driftwalk.schema.answers.facts import AnswerParts, texts
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
 
 HELD_OUT_REPLICATES: Final = 20
-"""Worlds by which the answer of a search is judged."""
+"""Worlds by which the answer of a search is judged; chosen by hand."""
 
 
 class HeldOutScore(NamedTuple):
@@ -132,21 +132,22 @@ class VerdictPolicy(NamedTuple):
     """When a model explains a recording."""
 
     most_over_own: float = 2.0
-    """Distance in distances of the recording's own parts. Simulated recordings of the right model
-    have 0.8 to 1.9: the parts of one recording share slow changes."""
+    """Distance in distances of the recording's own parts. Measured: simulated recordings of the
+    right model have 0.8 to 1.9: the parts of one recording share slow changes."""
     most_ratio: float = 1.5
     """A fact is far off when it exceeds those of all replicates by this factor. Chosen by hand."""
     most_share_apart: float = 0.1
     """A share of the time is far off when it exceeds those of all replicates by this. Chosen by
     hand."""
     most_checks_off: int = 1
-    """Facts that may be far off: a KS distance hardly sees tails, which the right model may
-    miss."""
+    """Facts that may be far off: a KS distance hardly sees tails, which the right model may miss;
+    chosen by hand."""
     most_wall_share: float = 0.95
     """Share of the time at the wall beyond which a law away from it cannot be seen: laws were named
     rightly at up to 0.87, and a wrong one at 0.99 (200 recordings of studies/verdict)."""
     tied_sigmas: float = 2.0
-    """Models tie within this many standard errors of their difference: the usual 95 %."""
+    """Models tie within this many standard errors of their difference: the usual 95 %, by
+    convention."""
 
 
 VERDICT: Final = VerdictPolicy()

@@ -15,6 +15,7 @@ import numpy as np
 from driftwalk.core.arrays import Bools, Floats
 
 LEAST_PROBABILITY: Final = 1e-6
+"""Added to each count, so that no state becomes impossible to reach; chosen by hand."""
 
 
 class HiddenMarkovModel(NamedTuple):

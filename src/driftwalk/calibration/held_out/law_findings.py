@@ -40,15 +40,16 @@ class BoutPolicy(NamedTuple):
     """Chance of so large a distance of the recorded lengths from the model's, by the distribution
     of Kolmogorov's statistic."""
     longest_share: float = 0.05
-    """Part of the bouts, the longest ones, whose share of the time is the tail. Of 2, 5 and 10 %
-    it has the most power on rests of a power law of 1.1 to 1.5, with the mean that they share."""
+    """Part of the bouts, the longest ones, whose share of the time is the tail. Measured: of 2, 5
+    and 10 % it has the most power on rests of a power law of 1.1 to 1.5, with the mean that they
+    share."""
     tail_level: float = 0.002
     """Chance of such a tail in a recording of the law itself. Measured on Weibull laws of shapes
     0.5 to 1.4: 3 of 900. Power on those power laws against the nearest Weibull law: 61 % with 60
     rests, 96 % with 120, all with 350."""
     quiet: float = 6.0
-    """Ratio of the level to the noise of a position above which the camera cuts up no rest: its
-    noise takes a step of a body at rest beyond it once in 8,000."""
+    """Ratio of the level to the noise of a position above which the camera cuts up no rest: chance:
+    its noise takes a step of a body at rest beyond it once in 8,000."""
     fewest: int = 20
     """Bouts without which nothing is said; chosen by hand."""
 
@@ -178,8 +179,8 @@ class MisfitPolicy(NamedTuple):
     """Which misfit of the summaries of a motion speaks against a law."""
 
     usual_quantile: float = 0.95
-    """Quantile of the misfits of the law's own recordings up to which one is usual: one in twenty
-    is called unlike it."""
+    """Quantile of the misfits of the law's own recordings up to which one is usual: by chance one
+    in twenty is called unlike it."""
     against: float = 1.5
     """Misfit, in that quantile, from which it speaks against the law: at most 1.23 in 160
     recordings of the law itself (studies/motion_models), 3.5 and more on wrong ones."""

@@ -15,8 +15,7 @@ from driftwalk.calibration.held_out.wall_clearance import Clearance, estimate_cl
 from driftwalk.calibration.problem import require_samples
 from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import (
-    BLOCKS,
-    FEWEST_POINTS,
+    ASPECT_POLICY,
     Aspect,
     AspectPlan,
     AspectReference,
@@ -50,7 +49,7 @@ if TYPE_CHECKING:
 
 
 LAGS: Final = (1, 3, 10, 30, 100)
-"""Of the mean squared displacement, in step intervals."""
+"""Of the mean squared displacement, in step intervals; chosen by hand."""
 CHECKS: Final = (*(f"displacement_{lag}" for lag in LAGS), "speed_time", "wall_share", "rest_share")
 UNITS: Final = (*("m2" for _ in LAGS), "s", "1", "1")
 
@@ -276,7 +275,7 @@ class RecordedMotion:
     def without_each_block(self) -> tuple[AspectReference, ...]:
         """The odd blocks without each of them, over the same floors."""
         found = []
-        for block in range(1, BLOCKS, 2):
+        for block in range(1, ASPECT_POLICY.blocks, 2):
             left = [
                 one.within(block_of(one.time, self.duration) != block).points
                 for one in self.held_aspects
@@ -387,14 +386,18 @@ def body_motion(
     # What one part hardly shows cannot be judged on it.
     shown = [min(len(one.points), len(other.points)) for one, other in zip(even, odd, strict=True)]
     even, odd = (
-        [one for one, points in zip(part, shown, strict=True) if points >= FEWEST_POINTS]
+        [
+            one
+            for one, points in zip(part, shown, strict=True)
+            if points >= ASPECT_POLICY.fewest_points
+        ]
         for part in (even, odd)
     )
     if not even or even[0].name != "steps":
         raise InputError(
-            f"one half of the recording's blocks of time has fewer than {FEWEST_POINTS} steps with "
-            "a direction: it is too short, or too much at rest, for the step interval "
-            "(`step_interval`)"
+            "one half of the recording's blocks of time has fewer than "
+            f"{ASPECT_POLICY.fewest_points} steps with a direction: it is too short, or too much "
+            "at rest, for the step interval (`step_interval`)"
         )
     fitted, held = (aspect_reference(part, duration=duration) for part in (even, odd))
     return RecordedMotion(

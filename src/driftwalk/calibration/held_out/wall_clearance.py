@@ -13,21 +13,23 @@ class ClearancePolicy(NamedTuple):
     """How the distance at contact is deconvolved from the noise of the camera."""
 
     nearest_share: float = 0.01
-    """The nearest samples may be tracking errors: this share is not trusted to be near the wall."""
+    """The nearest samples may be tracking errors: this share is not trusted to be near the wall;
+    chosen by hand."""
     outward: float = 20.0
     """How far outwards of them the contact is looked for, in noises; chosen by hand."""
     inward: float = 10.0
     """How far inwards of them distances are looked at, in noises; chosen by hand."""
     least_blur: float = 3e-4
-    """Noise of a recording without any, in parts of its largest distance: contact is then found
-    to a tenth of that."""
+    """Noise of a recording without any, in parts of its largest distance: contact is then found to
+    a tenth of that; chosen by hand."""
     blurs: tuple[float, ...] = (
         *(0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15, 1.2), 1.35, 1.6, 2.0, 2.8, 4.0,
     )  # fmt: skip
     """Noises that are tried, in estimated ones: the estimate has an error, and a body that turns
-    touches the wall at more than one distance."""
+    touches the wall at more than one distance; chosen by hand."""
     rounds: int = 200
-    """Of expectation maximisation for the weights; the estimate stays the same with 1000."""
+    """Of expectation maximisation for the weights; measured: the estimate stays the same with
+    1000."""
 
 
 _CLEARANCE: Final = ClearancePolicy()

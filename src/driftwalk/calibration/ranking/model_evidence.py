@@ -14,7 +14,7 @@ from driftwalk.calibration.estimation.label_switching import label_order
 from driftwalk.calibration.estimation.regression_abc import REGRESSION
 from driftwalk.calibration.estimation.summaries import SummaryObjective
 from driftwalk.calibration.estimation.synthetic_likelihood import (
-    SIMULATIONS,
+    SYNTHETIC,
     synthetic_likelihood_at,
 )
 from driftwalk.calibration.evolution import rounded
@@ -39,23 +39,24 @@ class EvidencePolicy(NamedTuple):
 
     tied_sigmas: float = 4.0
     """Models tie within this many standard errors. With ten blocks, errors are known to a quarter,
-    and one of six models is far off."""
+    and one of six models is far off; chosen by hand."""
     most_models: int = 5
-    """Most models that are matched: a bound on the time."""
+    """Most models that are matched: a bound on the time; chosen by hand."""
     rival: float = 20.0
     """Difference of deviance below which a model is not rejected: two standard errors. A deviance
-    has one of 6.6, as 512 simulations give the covariance of a hundred summaries."""
+    has one of 6.6, as 512 simulations give the covariance of a hundred summaries; chosen by
+    hand."""
     doubt: float = 10.0
     """Difference from which a model with more numbers leaves open whether the simpler one is right:
-    one standard error. The price of the numbers is in the deviance."""
+    one standard error. The price of the numbers is in the deviance; chosen by hand."""
     hopeless: float = 3.0
     """Discrepancy per summary above which a search is given up. The true model has 0.7 to 1.2;
-    wrong ones would take three times as long."""
+    wrong ones would take three times as long; chosen by hand."""
     starts: int = 2
-    """Starts: from the regression, and from the answer of the distances."""
+    """Starts: from the regression, and from the answer of the distances; chosen by hand."""
     blur: float = 1e-3
     """Noise added to simulated summaries. At a wall without camera noise some vary by less, and a
-    micrometre of clearance would count as another motion."""
+    micrometre of clearance would count as another motion; chosen by hand."""
 
 
 EVIDENCE: Final = EvidencePolicy()
@@ -190,9 +191,9 @@ def ranking_sentence(
 def most_settings(parameters: int, replicates: int) -> int:
     """Return how many settings `estimate_evidence` simulates at most."""
     if not parameters:
-        return SIMULATIONS + replicates
+        return SYNTHETIC.simulations + replicates
     narrow = EVIDENCE.starts * simulations_of(parameters)[0] * GAUSS_NEWTON.most_rounds
-    return REGRESSION.most_simulations + narrow + SIMULATIONS + replicates
+    return REGRESSION.most_simulations + narrow + SYNTHETIC.simulations + replicates
 
 
 @one_blas_thread()

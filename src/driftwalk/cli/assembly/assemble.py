@@ -58,6 +58,7 @@ def assemble(
     """
     from driftwalk.runs import AssemblyWork
 
+    # Before anything is read: the film is drawn last, and a wrong one would cost the whole run.
     _check_film(film)
     given, quantiles = with_glued(with_binding(given, binding), earlier)
     refused = [] if given.file is None else ["--study"]

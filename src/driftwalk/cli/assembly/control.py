@@ -96,6 +96,7 @@ def plan(
     ]
     strengths = vary_strengths(vary or [])
     seed = sources[0].study.assembly.seed
+    # One fit gives its modes no name of its own: the strengths tell them apart.
     names = [run.name if len(sources) > 1 else "" for run in runs or [Path()]]
     taken = [settings_of(one, name, flow) for one, name in zip(sources, names, strict=True)]
     modes = make_modes(

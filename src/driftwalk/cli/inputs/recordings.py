@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 
 FIT_TANK: Final = 0.5
-"""Share of the rim that was visited from which on the tank can be taken from the positions."""
+"""Share of the rim that was visited from which on the tank can be taken from the positions; chosen
+by hand."""
 
 
 def read_for_run(
@@ -179,6 +180,7 @@ def opening_note(
     from driftwalk.model import Study, load_study
 
     file = Study() if given.file is None else load_study(given.file)
+    # Keys that another option states along with its own.
     also = {"block.depth_m": "block.depth", "block.side_m": "block.shape"}
 
     def stated(key: str, text: str) -> str:

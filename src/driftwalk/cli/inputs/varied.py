@@ -11,6 +11,7 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.units import parse_quantity, share_unit
 
 MOST_VALUES: Final = 1_000_000
+"""Values of a range at most: a mistyped step is refused before memory runs out; chosen by hand."""
 
 
 def read_varied(

@@ -17,7 +17,8 @@ from driftwalk.core.errors import FormatError, InputError
 if TYPE_CHECKING:
     from driftwalk.track import Board, Camera
 
-# Corners are found to a tenth of a pixel; farther off, the board or the lens is another one.
+# Corners are found to a tenth of a pixel; farther off, the board or the lens is another one; chosen
+# by hand.
 _POOR_PX: Final = 1.0
 camera_app = typer.Typer(add_completion=False, cls=HelpGroup)
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _PANEL = "Criteria of a join"
-# Centres of blocks that touch are a side apart, and noise takes off a little.
+# Centres of blocks that touch are a side apart, and noise takes off a little; chosen by hand.
 _TOO_CLOSE = 0.8
 
 

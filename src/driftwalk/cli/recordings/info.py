@@ -14,7 +14,7 @@ SIDE_BY_SIDE = 5
 """Bodies shown as columns; more are shown as rows, with fewer numbers."""
 
 MOST_UNREAD = 12
-"""Columns that are not read, of which each has a row."""
+"""Columns that are not read, of which each has a row; chosen by hand."""
 
 _ROWS: list[tuple[str, str, float]] = [
     ("samples", "samples", 1),
@@ -44,10 +44,12 @@ _ROWS: list[tuple[str, str, float]] = [
     ("  standard error (deg)", "orientation_noise_standard_error_rad", 57.29577951308232),
     ("identity ambiguous (%)", "ambiguous_share", 100),
 ]
+"""Rows of a recording: label, name of the fact, and the factor from SI to the unit shown."""
 _CIRCLE_ROWS: list[tuple[str, str, float]] = [
     ("circle of centres: radius (cm)", "radius_m", 100),
     ("  rim visited (%)", "sectors_visited_share", 100),
 ]
+"""The same of the circle that is fitted to the positions."""
 _OF_A_RECORDING: list[tuple[str, str, float]] = [
     ("tracks", "tracks_used", 1),
     ("samples", "samples_used", 1),

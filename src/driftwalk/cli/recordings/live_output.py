@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from driftwalk.track import AssemblySeen, Camera, Frame, LiveServer, SeenEvent, TrackState
 
 VERSION: Final = 1
+"""Version of the lines of JSON; a reader refuses another one."""
 
 
 class LiveOutputs:

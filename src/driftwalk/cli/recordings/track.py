@@ -139,9 +139,12 @@ Pose = tuple[float, float, float]
 Look = Callable[["Frame", "Sequence[TrackState]", "AssemblySeen | None", int], None]
 
 _SAVE_EVERY_S: Final = 10.0
-# A save may take this share of the time, so that those of a long recording become rarer.
+"""Least time between two saves [s]: a crash loses no more than this. Chosen by hand."""
+# A save may take this share of the time, so that those of a long recording become rarer; chosen by
+# hand.
 _SAVING_SHARE: Final = 0.05
 _MOST_KINDS: Final = 4
+"""Kinds of rejected regions that the summary names, the most frequent ones; chosen by hand."""
 
 
 class TrackingRun:

@@ -15,14 +15,18 @@ from driftwalk.core.errors import ConfigurationError, InputError
 if TYPE_CHECKING:
     from driftwalk.track import AssemblyObserver, Camera, Detector, Tracker, TwoColourMarker
 
-# Images that are looked at before: the median of many hides what moves, that of a few glare.
+# Images that are looked at before: the median of many hides what moves, that of a few glare; chosen
+# by hand.
 _FOR_BACKGROUND: Final = 25
 _FOR_RIM: Final = 7
+"""Images that are looked at where only the rim is searched: it stands still; chosen by hand."""
 _FOR_COLOURS: Final = 60
+"""Images among which a missing colour is looked for before the file is refused; chosen by hand."""
 _LEAST_DISC_PX: Final = 2.0
-# Detections of something else in a frame: 1 per square metre in a tank of 30 cm.
+"""Width of a disc below which the scale must be wrong: no pixel has its colour alone [px]."""
+# Detections of something else in a frame: 1 per square metre in a tank of 30 cm; chosen by hand.
 _CLUTTER_PER_FRAME: Final = 0.07
-# A rim that stands a little above the water is seen larger.
+# A rim that stands a little above the water is seen larger; chosen by hand.
 _RIM_OFF: Final = 0.03
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from driftwalk.track import AssemblySeen, Frame, TrackState
 
 _MOST_CLASSES = 6
+"""Classes that a message names before it counts the others; one line of a terminal holds them."""
 
 
 @with_options(

@@ -17,8 +17,11 @@ from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.core.errors import DriftwalkError
 
 EXIT_USER_ERROR = 2
+"""Of a wrong use, as POSIX shells and Click have it."""
 EXIT_INTERRUPTED = 130
+"""128 and the number of SIGINT, as shells have it."""
 EXIT_BROKEN_PIPE = 141
+"""128 and the number of SIGPIPE, as shells have it."""
 # What other programs, and earlier versions, call an option or a command, and what it is here.
 _SYNONYMS = {
     **dict.fromkeys(("--arena", "--tank-diameter", "--diameter"), "--tank"),
@@ -33,7 +36,7 @@ _SYNONYMS = {
     "convert": "driftwalk read",
 }
 _LONGEST = 1500
-"""Characters of a message; it may quote what a file holds."""
+"""Characters of a message; it may quote what a file holds; chosen by hand."""
 
 
 class PastTyper(Exception):

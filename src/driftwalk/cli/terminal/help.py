@@ -46,6 +46,7 @@ _GROUPS: Final = {
 """Where an option stands that is declared without a group."""
 _LAST: Final = (_RESULT, _COMPUTING, _HELP)
 _COLUMN: Final = 30
+"""Widest column of the names of options; a longer name stands on a line of its own."""
 
 
 class _WithHelp:

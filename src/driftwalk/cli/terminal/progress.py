@@ -12,8 +12,9 @@ from typing import Any, Self, TextIO
 from driftwalk.core.progress import WHOLE
 
 SECONDS_BETWEEN_LINES = 10.0
+"""In a log file, where lines stay: six a minute, chosen by hand."""
 SECONDS_TO_JUDGE = 1.0
-"""The time left is judged from so much of the work at least."""
+"""The time left is judged from so much of the work at least; chosen by hand."""
 
 
 class ProgressReporter:

@@ -35,6 +35,8 @@ _REASONS: Final[dict[int, tuple[str, str]]] = {
 # reads for milliseconds, a scanner of files for a second, a spreadsheet until it is closed.
 OPEN_FILES_STAY: Final = os.name == "nt"
 PAUSES_S: Final = (0.01, 0.03, 0.1, 0.3, 1.0, 2.0)
+"""Waits between attempts [s], 3.4 s together: longer than a scanner holds a file. Chosen by
+hand."""
 # Errors of the storage, whatever file they came from; the others count only for a file of ours.
 _STORAGE: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
 

@@ -33,7 +33,9 @@ PREVIOUS_FOLDER: Final = "previous"
 # The names that `move_aside` gives: 20110925T120000Z, 20110925T120000Z-2.
 _MOVED: Final = re.compile(r"\d{8}T\d{6}Z(-\d{1,6})?", re.ASCII)
 _JOURNAL_BYTES: Final = 64
+"""Bytes of the journal that are read: more than twice what a name of `_MOVED` has."""
 _MOST_FAULTS: Final = 8
+"""Faults that a message names before it counts the others."""
 
 
 def state_of(path: str | Path) -> State:

@@ -23,8 +23,10 @@ SHARD_SUFFIX: Final = ".npz"
 # Member of a shard that says which unit of which sweep it belongs to and what it must hold.
 _LABEL: Final = "unit.json"
 _DIGEST_SIZE: Final = 64
+"""Bytes of the hash at the end of a shard, as hexadecimal digits of SHA-256."""
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}", re.ASCII)
 _KEYS_NAMED: Final = 6
+"""Keys that a message names before it counts the others."""
 
 Arrays = dict[str, npt.NDArray[Any]]
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ROWS_AT_ONCE: Final = 200_000
+"""Rows that are written at once: the memory for a long recording stays bounded. Chosen by hand."""
 
 
 def write_csv(motion: Motion, folder: Path) -> list[Path]:
@@ -230,6 +231,7 @@ def movement_dataset(recording: xr.Dataset) -> xr.Dataset:
 
 POSE_STAMPED: Final = "geometry_msgs/msg/PoseStamped"
 NS_PER_S: Final = 1_000_000_000
+"""Nanoseconds of a second: a stamp of ROS counts whole ones."""
 
 
 def write_ros(motion: Motion, folder: Path) -> list[Path]:

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from driftwalk.model import Tank
 
 PIECES: Final = 64
-"""Flat pieces that make a round wall: they stand at most 0.12 % of the radius outside of it."""
+"""Flat pieces that make a round wall: in closed form they stand at most 0.12 % of the radius
+outside of it."""
 
 
 class Folder:

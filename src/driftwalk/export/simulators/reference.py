@@ -17,11 +17,12 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 TRIED: Final = 64
-"""Replicates among which those that stay clear of the wall are looked for."""
+"""Replicates among which those that stay clear of the wall are looked for; chosen by hand."""
 KEPT: Final = 4
-"""Most paths of each set, without the stochastic force and with it."""
+"""Most paths of each set, without the stochastic force and with it; chosen by hand."""
 LENGTHS_S: Final = (10.0, 5.0, 2.0, 1.0)
-"""Lengths of the paths, the longest first: in a narrow tank none is clear of the wall for long."""
+"""Lengths of the paths, the longest first: in a narrow tank none is clear of the wall for long;
+chosen by hand."""
 NO_PATH: Final = "no path stays clear of the wall of this tank for a second: nothing was compared"
 
 

@@ -22,6 +22,7 @@ _ENDINGS: Final = ("_filtered", "_original", "")
 """Of what PIVlab saves of the velocities, the first that is there is read."""
 _NUMBERED: Final = re.compile(r"u_(\d+)")
 _MOST_FRAMES: Final = 10_000
+"""Frames that are read: a damaged file may claim any number. Chosen by hand."""
 
 
 class _Names(NamedTuple):

@@ -137,6 +137,7 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
     if program.zero_is_missing and not marks:
         missing |= (values[:, 2:4] == 0.0).all(axis=1)
     notes = []
+    # After the marks: a value such as -9999 stands out only where those nodes are not counted.
     for value in _sentinels(values[~missing, 2:4]):
         marked = (values[:, 2:4] == value).all(axis=1)
         missing |= marked

@@ -35,15 +35,15 @@ class VerdictPolicy(NamedTuple):
     now and then. Chosen by hand."""
     missed_outliers: float = 0.25
     """Mistakes of a tracker that show in the innovations alone, over those that their neighbours
-    show: 9 to 14 % where positions were 5 mm off."""
+    show. Measured: 9 to 14 % where positions were 5 mm off."""
     drag_change: float = 0.05
     """Change of C_d with speed that the fit itself brings about. Measured: in ten minutes of the
     model itself C_d seems 4 % lower at the lowest speeds and 5 % higher at the highest, in half an
     hour 2 % each."""
     fewest_used: int = 300
-    """Intervals that a check needs. With fewer the fitted flow takes so much out of the innovations
-    that recordings of the model itself fail the test of their autocorrelation: 3 of 5 did with 200
-    samples, none of 5 with 300."""
+    """Intervals that a check needs. Measured: with fewer the fitted flow takes so much out of the
+    innovations that recordings of the model itself fail the test of their autocorrelation: 3 of 5
+    did with 200 samples, none of 5 with 300."""
 
 
 VERDICT: Final = VerdictPolicy()
@@ -60,7 +60,7 @@ class LargestPolicy(NamedTuple):
     """Relative change of the flow's strength in a part of the recording. Chosen by hand: right
     recordings have 0.01, a block that stays in one place has 0.8."""
     drag: float = 1.0
-    """Relative change of C_d with the speed."""
+    """Relative change of C_d with the speed; chosen by hand."""
 
 
 class LeastPolicy(NamedTuple):
@@ -79,8 +79,9 @@ class LeastPolicy(NamedTuple):
     Chosen by hand: what a few passages through a flow with more detail than the spline bring about
     in recordings whose C_d is right (confirmation-2 of studies/verdict)."""
     kurtosis: float = 0.3
-    """Excess kurtosis of the errors of prediction. The standard error of sigma_F is proportional to
-    (1 + kurtosis / 2)^(1/2): at 0.3 it is stated 7 % too small. The estimate does not change."""
+    """Excess kurtosis of the errors of prediction. The standard error of sigma_F is in closed form
+    proportional to (1 + kurtosis / 2)^(1/2): at 0.3 it is stated 7 % too small. The estimate does
+    not change."""
 
 
 LARGEST: Final = LargestPolicy()

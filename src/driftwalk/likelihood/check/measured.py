@@ -28,6 +28,9 @@ class PlacementPolicy(NamedTuple):
     agrees: float = 0.9
     """Correlation of two flows from which on they are the same. With errors of 5 % that of a
     measured flow with the fitted one is 0.99. Chosen by hand."""
+    covers: float = 0.5
+    """Share of the fitted nodes that a placement has to cover for its correlation to count. Chosen
+    by hand."""
 
 
 PLACEMENT: Final = PlacementPolicy()
@@ -46,7 +49,7 @@ def best_placement(measured: MeasuredFlow, free: xr.Dataset) -> Placement:
     known = flow["flag"].values == FLAGS["measured"]
     x, y = flow["x"].values, flow["y"].values
     want = np.stack([flow[name].values for name in ("u", "v")])
-    enough = 0.5 * np.count_nonzero(known)
+    enough = PLACEMENT.covers * np.count_nonzero(known)
     return max(
         (
             Placement(words, _correlation(moved, want, known & there, enough))

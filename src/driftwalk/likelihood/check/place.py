@@ -26,22 +26,24 @@ class GroupPolicy(NamedTuple):
     cells_per_side: float = 1.5
     """Cells along a side of the block. Chosen by hand, as what follows."""
     most_cells: int = 24
-    """Most cells across the tank."""
+    """Most cells across the tank; chosen by hand."""
     time_bins: int = 10
-    """Most parts of the recordings."""
+    """Most parts of the recordings; chosen by hand."""
     fewest_in_part: int = 300
-    """Samples of a part of the recordings."""
+    """Samples of a part of the recordings; chosen by hand."""
     speed_bins: int = 6
-    """Ranges of the speed of the water past the block."""
+    """Ranges of the speed of the water past the block; chosen by hand."""
     fewest_in_cell: int = 20
     """Samples of a cell for the mean of its innovations: in cells of 11 to 15 one contact near
     the margin of the wall made it 10 to 20 sd (development set of studies/verdict)."""
     fewest_for_spread: int = 50
-    """Samples that make the mean of their squares about normal."""
+    """Samples that make the mean of their squares about normal; chosen by hand."""
     least_visible: float = 0.5
-    """Share of a group's change that must be left by the fit for its estimate to mean something."""
+    """Share of a group's change that must be left by the fit for its estimate to mean something;
+    chosen by hand."""
     least_freedom: float = 0.1
-    """A direction in which fitting has left less than this share of the variance says nothing."""
+    """A direction in which fitting has left less than this share of the variance says nothing;
+    chosen by hand."""
     cell_freedom: float = 0.3
     """Share of the variance that counts as left at least, in a direction of one cell. The share is
     that of the linearised model: on a path that was taken once, shares of 0.09 and 0.12 made errors

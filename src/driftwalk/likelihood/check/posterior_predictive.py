@@ -19,14 +19,14 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.power import POWER
 from driftwalk.likelihood.check.replicates import Replicates
-from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR
+from driftwalk.schema.answers.facts import GOODNESS
 
 BAND: Final = 0.9
-"""Share of the replicates within the bands of the densities."""
+"""Share of the replicates within the bands of the densities; by convention."""
 BINS: Final = 40
 """Bins of a density. Chosen by hand."""
 FEWEST_REPLICATES: Final = 4
-"""Sound replicates of either set: two on either side of the noise floor."""
+"""Sound replicates of either set: two on either side of the noise floor; chosen by hand."""
 
 
 class Density(NamedTuple):
@@ -58,7 +58,8 @@ class MotionComparison(NamedTuple):
     @property
     def far(self) -> bool:
         """Whether the recording is far from replicates at the estimate."""
-        return float(np.median(self.distance)) > FAR_ABOVE_FLOOR * float(np.median(self.floor))
+        floor = float(np.median(self.floor))
+        return float(np.median(self.distance)) > GOODNESS.far_above_floor * floor
 
     @property
     def rank_p_value(self) -> float:

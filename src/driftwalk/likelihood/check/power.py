@@ -16,7 +16,7 @@ class PowerPolicy(NamedTuple):
     """The power at which detectable misfits are stated."""
 
     share: float = 0.9
-    """Share of recordings in which a misfit of the stated size is found."""
+    """Share of recordings in which a misfit of the stated size is found; by convention."""
 
 
 POWER: Final = PowerPolicy()

@@ -34,14 +34,14 @@ class RestartPolicy(NamedTuple):
     change_s: float = 100.0
     """The same where velocities at different times are compared, which have to be the replicate's
     own: a fit of a flow that is reversed half way has so little drag that in ten seconds a block
-    hardly forgets the recorded velocity."""
+    hardly forgets the recorded velocity; chosen by hand."""
     most_velocity_std_m_s: float = 0.05
     """Standard deviation of a velocity component, that of a face by the turning too, from which on
     the filter's velocity is not used. The filter assumes 0.1 m/s at its first sample and after a
-    gap or a contact; two samples later a few mm/s are left."""
+    gap or a contact; two samples later a few mm/s are left; chosen by hand."""
     on_grid: float = 0.05
     """Share of the usual interval by which time stamps may be off a regular grid, on which all
-    sections are simulated together; as for steps (`STEP_PLAN`)."""
+    sections are simulated together; by convention as for steps (`STEP_PLAN`)."""
     most_irregular: int = 20
     """Sections of a recording without such a grid, each of which is simulated alone. Chosen by
     hand."""

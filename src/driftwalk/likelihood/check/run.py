@@ -41,7 +41,7 @@ from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.warnings import against_water, is_against_water
 from driftwalk.schema.answers.facts import facts_of, fitted_value, sentences, texts
 from driftwalk.schema.answers.fit import with_verdict
-from driftwalk.schema.answers.force_law import LEAST_EVIDENCE
+from driftwalk.schema.answers.force_law import SELECTION
 from driftwalk.schema.answers.verdict import (
     DOES_NOT_EXPLAIN,
     EXPLAINS,
@@ -374,7 +374,8 @@ def _with_angle_tried(
         )
         gain = after - before
         helps = (
-            gain > LEAST_EVIDENCE and check_model(rival, other, body=body)["verdict"] == EXPLAINS
+            gain > SELECTION.least_evidence
+            and check_model(rival, other, body=body)["verdict"] == EXPLAINS
         )
     except (InputError, *BREAKDOWN):
         helps = False

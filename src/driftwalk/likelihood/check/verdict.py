@@ -29,24 +29,25 @@ class InformationPolicy(NamedTuple):
     """
 
     least_visited: float = 0.08
-    """Share of the tank. Not asked of a floating body: its C_d was 0 to 9 % off in twelve orbits
-    over 2 to 6 % (held-out set). Under the paper's law two orbits over 4 and 6 % had C_d 41 and
-    83 % off, and passed every criterion."""
+    """Share of the tank, measured (studies/verdict). Not asked of a floating body: its C_d was 0 to
+    9 % off in twelve orbits over 2 to 6 % (held-out set). Under the paper's law two orbits over 4
+    and 6 % had C_d 41 and 83 % off, and passed every criterion."""
     least_blocks: float = 5.0
-    """Area in blocks: those orbits covered 2.5 and 3.5, and one along half the radius of the usual
-    tank covers 10."""
+    """Area in blocks. Measured: those orbits covered 2.5 and 3.5, and one along half the radius of
+    the usual tank covers 10."""
     most_wall_share: float = 0.8
-    """Share of the intervals at the wall. C_d of eight blocks at 62 to 89 % was -10 to +21 % off,
-    all within 1.7 standard deviations; at 94 to 98 % three had it 5 to 24 times too large (54
-    recordings of the held-out set at the wall for more than 10 %)."""
+    """Share of the intervals at the wall. Measured: C_d of eight blocks at 62 to 89 % was -10 to
+    +21 % off, all within 1.7 standard deviations; at 94 to 98 % three had it 5 to 24 times too
+    large (54 recordings of the held-out set at the wall for more than 10 %)."""
     wall_share_in_doubt: float = 0.2
     """Share of the intervals at the wall from which C_d has to be known well. Chosen by hand."""
     most_drag_std_at_wall: float = 0.05
-    """Relative standard deviation of C_d up to which it is known well: in those recordings C_d was
-    0 to 7 % off below it and up to 24 % above, as the standard deviations say."""
+    """Relative standard deviation of C_d up to which it is known well. Measured in those
+    recordings: C_d was 0 to 7 % off below it and up to 24 % above, as the standard deviations
+    say."""
     most_lever: float = 1 / 30
-    """Lever of the force, in sides of the block. C_d was within 5 % at up to 0.027 of a side and
-    more than 85 % off from 0.06 on (development set)."""
+    """Lever of the force, in sides of the block. Measured: C_d was within 5 % at up to 0.027 of a
+    side and more than 85 % off from 0.06 on (development set)."""
     most_drag_std: float = 0.1
     """Relative standard deviation of C_d beyond which the steps have to have power: the errors of
     prediction alone do not settle the model then. Chosen by hand."""

@@ -38,13 +38,13 @@ class LatticePolicy(NamedTuple):
     """Restitutions of the coarse lattice. Chosen by hand, as what follows."""
     holds: tuple[float, ...] = (0.0, 0.1, 0.25, 0.45, 0.65)
     """Holds of the coarse lattice. From a friction of about 1 on every contact sticks, and more of
-    it changes nothing."""
+    it changes nothing; chosen by hand."""
     most_hold: float = 0.8
-    """Largest hold that is tried."""
+    """Largest hold that is tried; chosen by hand."""
     finer: tuple[tuple[float, float], ...] = ((0.25, 0.12), (0.15, 0.05))
-    """Half the widths of the finer lattices, in restitution and hold."""
+    """Half the widths of the finer lattices, in restitution and hold; chosen by hand."""
     fine: int = 5
-    """Places of a finer lattice along each axis."""
+    """Places of a finer lattice along each axis; chosen by hand."""
 
 
 LATTICE: Final = LatticePolicy()

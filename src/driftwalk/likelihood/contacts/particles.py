@@ -37,11 +37,11 @@ class PassagePolicy(NamedTuple):
     before: int = 3
     """Samples that a passage begins before the wall. Chosen by hand, as what follows."""
     after: int = 4
-    """Samples that it ends after the wall."""
+    """Samples that it ends after the wall; chosen by hand."""
     longest: int = 25
-    """Most samples from the wall on."""
+    """Most samples from the wall on; chosen by hand."""
     uneven: float = 0.2
-    """Largest relative difference of an interval from the usual one."""
+    """Largest relative difference of an interval from the usual one; chosen by hand."""
 
 
 PASSAGE: Final = PassagePolicy()
@@ -118,7 +118,7 @@ class ParticlePolicy(NamedTuple):
     """Factor on the camera's noise. Chosen by hand."""
     force_draws: int = 2
     """Draws of the force from sample to sample, at least: a force that is held for longer comes out
-    too weak."""
+    too weak; chosen by hand."""
 
 
 PARTICLE: Final = ParticlePolicy()

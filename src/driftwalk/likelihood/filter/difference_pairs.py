@@ -52,7 +52,7 @@ class DifferencePolicy(NamedTuple):
     """Change of the logarithm of a noise. Chosen by hand."""
     most_change: float = 1e-2
     """Largest relative change of a variance between the passes. It is a hundred steps: a larger one
-    means that one pass restarted where the other did not."""
+    means that one pass restarted where the other did not; chosen by hand."""
     most_change_far: float = 1.0
     """The same for a number that is tried far from its value. Chosen by hand."""
     least_comparable: float = 0.95

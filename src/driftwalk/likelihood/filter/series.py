@@ -58,7 +58,7 @@ class FilterPolicy(NamedTuple):
     studies/verdict at the wall nine have 50 and more."""
     largest_prior_std: float = 0.1
     """Standard deviation of a velocity above which nothing is expected [m/s]: as much as a velocity
-    may be where nothing is known of it (`unknown_speed` of the filter)."""
+    may be where nothing is known of it (`unknown_speed` of the filter); chosen by hand."""
     settling_samples: int = 3
     """Samples left out after a missing frame when other explanations of an error are tried: in
     these a wrong place counts in the filter's velocity. Chosen by hand."""
@@ -200,11 +200,12 @@ ORIENTED_SHARE: Final = 0.5
 """Share of the samples with an orientation from which on the fit uses orientations by default, and
 the search for dropped frames does. Chosen by hand: the majority."""
 WINDOW: Final = 5
-"""Fewest samples of a parabola, the nearest in time, so that gaps and uneven clocks are no case."""
+"""Fewest samples of a parabola, the nearest in time, so that gaps and uneven clocks are no case;
+chosen by hand."""
 WINDOW_S: Final = 0.16
-"""Time that a parabola covers [s]: five samples at 25 Hz. Of five samples of a faster camera the
-turning rate is mostly noise of the angle: with the angle as an input C_d came out 7 % too small at
-50 Hz and 21 % at 100 Hz, in simulated recordings with 0.5 degrees of noise."""
+"""Time that a parabola covers [s]: five samples at 25 Hz. With five samples of a faster camera the
+turning rate is mostly noise of the angle: measured, with the angle as an input C_d came out 7 % too
+small at 50 Hz and 21 % at 100 Hz, in simulated recordings with 0.5 degrees of noise."""
 
 
 PART: Final = 10_000

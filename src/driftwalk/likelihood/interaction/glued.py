@@ -44,11 +44,12 @@ class GluedPolicy(NamedTuple):
     """How the correlation is searched."""
 
     first_share: float = 0.5
-    """Share of hidden drag at which the search begins."""
+    """Share of hidden drag at which the search begins; chosen by hand."""
     most_correlation: float = 0.995
-    """Largest correlation of the forces on two blocks side by side: a length of ten sides."""
+    """Largest correlation of the forces on two blocks side by side: a length of ten sides; chosen
+    by hand."""
     nodes: int = 2001
-    """Of the posterior of the correlation."""
+    """Of the posterior of the correlation; chosen by hand."""
     quantiles: int = 100
     """Values of the length that are kept, each for the same share of its posterior. A prediction
     draws from them; 1000 runs take 40 draws. Chosen by hand."""

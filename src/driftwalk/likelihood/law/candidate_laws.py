@@ -89,3 +89,5 @@ NUMBERS: Final[Mapping[str, Number]] = {
     "mode_frequency": Number(0.0, 1e-7, 1e-2, 2e-4, 0.0, 10.0),
     "mode_phase": Number(0.0, 1e-4, 2.0, 0.3, -10.0, 10.0),
 }
+"""By name. Steps are far below what a recording can tell; priors and bounds hold what a laboratory
+may have. Chosen by hand."""

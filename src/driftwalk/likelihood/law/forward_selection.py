@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -25,52 +24,7 @@ from driftwalk.likelihood.law.score_tests import (
 )
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch
 from driftwalk.likelihood.prior import Weights
-from driftwalk.schema.answers.force_law import MEMORY_SIGMAS, OPENED_SIGMAS
-
-
-class SelectionPolicy(NamedTuple):
-    """When a number of a departure is opened, and when it stays open.
-
-    A number is asked for when its score test is beyond `OPENED_SIGMAS`, and the force's memory
-    beyond `MEMORY_SIGMAS`: see `driftwalk.schema.answers.force_law`.
-    """
-
-    retained_sigmas: float = 3.0
-    """An opened number stays open when the fit finds it further from the model than this [standard
-    deviations], with half of its least effect as an error of the filter. Chosen by hand; none of
-    380 recordings of the model opened a number (studies/misfit, set right)."""
-    retained_memory_sigmas: float = 3.4
-    """The same for the memory of the force: a flow with more detail than the spline acts like a
-    memory of 0.1 s (docs/explanation/likelihood.md)."""
-    strength_chi_squared: float = 50.0
-    """Chi squared (7 degrees of freedom) of the flow's strength from which on its slow change is
-    opened: chance exceeds it once in 7e7."""
-    retained_chi_squared: float = 21.8
-    """The same from which on it stays open: the chance of 3 standard deviations, once in 370."""
-    rounds: int = 3
-    """Rounds of score tests and openings. Chosen by hand."""
-    linear_share: float = 0.15
-    """Least effect of a linear part: a smaller one may be an error of the filter. Chosen by hand,
-    as the least effects that follow (studies/misfit/power.py shows what they let through)."""
-    drag_power: float = 0.15
-    """Least change of the drag's power."""
-    force_memory: float = 0.04
-    """Least memory of the force [s]."""
-    time_noise: float = 0.003
-    """Least jitter of the time stamps [s]."""
-    angle_offset_deg: float = 1.0
-    """Least offset of the angle [degrees]. The eight strips of a face feign up to 1.2 degrees in
-    blocks that float and spin fast (two recordings of studies/verdict; one of them was fitted again
-    with 32, and no offset was left)."""
-    marker: float = 0.012
-    """Least offset of the marker, in sides of the block."""
-    strength: float = 0.01
-    """Least amplitude of the line or of a cosine of the flow's strength."""
-    pulse: float = 0.02
-    """Least amplitude of a pulse."""
-
-
-SELECTION: Final = SelectionPolicy()
+from driftwalk.schema.answers.force_law import SELECTION
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +164,8 @@ class ForwardSelection:
     def _is_candidate(self, name: str, sigmas: float, estimate: float) -> bool:
         if name in ("force_memory", "time_variance", "linear_share") and estimate < 0.0:
             return False
-        least = MEMORY_SIGMAS if name == "force_memory" else OPENED_SIGMAS
+        memory = name == "force_memory"
+        least = SELECTION.memory_sigmas if memory else SELECTION.opened_sigmas
         return abs(sigmas) > least and abs(estimate) > self.least.get(name, 0.0)
 
     def _open(self, mode: Mode, candidates: Mapping[str, float]) -> tuple[Mode, set[str]]:

@@ -25,13 +25,14 @@ class PulsePolicy(NamedTuple):
     """When a line in the spectrum of errors times derivatives is a pulse of the flow."""
 
     oversampled: int = 4
-    """Frequencies of the spectrum for each period that the recording holds. A line between two of
-    them loses 5 % of its height at most."""
+    """Frequencies of the spectrum for each period that the recording holds. In closed form, a line
+    between two of them loses 5 % of its height at most."""
     finer: int = 10
-    """Places on either side of the highest of those frequencies, at which it is looked for."""
+    """Places on either side of the highest of those frequencies, at which it is looked for; chosen
+    by hand."""
     least_periods: float = 6.0
     """Periods that a recording holds at least. A slower change is one of the six cosines, or the
-    line, of the flow's strength."""
+    line, of the flow's strength; chosen by hand."""
     false_alarms: float = 1e-6
     """Chance that a steady flow seems to pulse at any frequency. Chosen by hand."""
 

@@ -34,7 +34,7 @@ from driftwalk.likelihood.newton import (
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.start import Starts
-from driftwalk.schema.answers.force_law import LEAST_EVIDENCE, OPENED_SIGMAS
+from driftwalk.schema.answers.force_law import SELECTION
 
 
 class LawPolicy(NamedTuple):
@@ -48,8 +48,8 @@ class LawPolicy(NamedTuple):
     deviations. Under the
     paper's law eight floating bodies had one of 3 to 18 (docs/explanation/likelihood.md)."""
     decisive_evidence: float = 100.0
-    """Difference of the log evidences that nothing missing has feigned. Pulses of the flow feigned
-    10; right laws are ahead by 130 and more where the recording tells them at all."""
+    """Difference of the log evidences that nothing missing has feigned. Measured: pulses of the
+    flow feigned 10; right laws are ahead by 130 and more where the recording tells them at all."""
     slight_sigmas: float = 4.0
     """A power of the drag that is too slight to be opened widens the intervals from this score test
     on [standard deviations]: chance exceeds it once in 16,000. A power of 2.12 had 5.4 in ten
@@ -64,11 +64,11 @@ class LawPolicy(NamedTuple):
     that float had 67 and more (studies/bodies)."""
     lever_sigmas: float = 1.64
     """A lever of the force counts when it is above the notable one by this many standard
-    deviations: 5 % of the recordings whose lever is just notable."""
+    deviations: by chance 5 % of the recordings whose lever is just notable."""
     notable_lever: float = 0.005
     """Lever of the force, in sides of the block, above which the turning does not follow the model.
-    On recordings of the model it comes out at 0.001 to 0.004, with angles 5 degrees off at
-    0.015."""
+    Measured: on recordings of the model it comes out at 0.001 to 0.004, with angles 5 degrees off
+    at 0.015."""
 
 
 LAW: Final = LawPolicy()
@@ -139,7 +139,7 @@ class LawSearch:
     ) -> LawResult:
         """Return the law with another power of the drag where it has more evidence."""
         powered = self._with_power(base, starts, weights)
-        if powered is not None and self._ahead(powered.mode, found.mode) > LEAST_EVIDENCE:
+        if powered is not None and self._ahead(powered.mode, found.mode) > SELECTION.least_evidence:
             return powered
         return found
 
@@ -177,7 +177,7 @@ class LawSearch:
         if linear > LAW.doubted_linear_sigmas:
             return True
         numbers = set(sigmas) - set(FLOATING)
-        if any(abs(sigmas[name]) > OPENED_SIGMAS for name in numbers):
+        if any(abs(sigmas[name]) > SELECTION.opened_sigmas for name in numbers):
             return True
         return self._turns_by_itself(paper) or self._stays_on_a_small_orbit()
 
@@ -201,7 +201,7 @@ class LawSearch:
         own = tests.chi_squared(dict.fromkeys(names, 0.0))
         other = tests.chi_squared({name: FLOATING[name] for name in names})
         apart = 0.5 * (other - own)
-        settled_by = max(apart, 0.0) if apart < LEAST_EVIDENCE else math.inf
+        settled_by = max(apart, 0.0) if apart < SELECTION.least_evidence else math.inf
         return replace(self._alone(paper, floating=False), settled_by=settled_by, tests=tests)
 
     def _compared(self, starts: Starts, weights: Weights, paper: Mode | None) -> LawResult:
@@ -221,7 +221,7 @@ class LawSearch:
         ahead = evidence.get("floating", -math.inf) - evidence.get("paper", -math.inf)
         whole = series is search.passes.series
         held = FROM_NEAR if whole else FROM_ANOTHER
-        if ahead >= LEAST_EVIDENCE:
+        if ahead >= SELECTION.least_evidence:
             near = found["floating"]
             mode: Mode | None = near
             if not (near.converged and whole):
@@ -266,7 +266,7 @@ class LawSearch:
             mode is None
             or not mode.converged
             or not is_retained(mode, "drag_power", self.selection.least)
-            or self._ahead(mode, base.mode) <= LEAST_EVIDENCE
+            or self._ahead(mode, base.mode) <= SELECTION.least_evidence
         ):
             return None
         return self.selection.select(replace(base, mode=mode, tests=None))
@@ -287,7 +287,7 @@ class LawSearch:
         if rival is None:
             return found
         ahead = self._ahead(rival, mode)
-        if ahead <= LEAST_EVIDENCE:
+        if ahead <= SELECTION.least_evidence:
             return found
         prior = self.search.prior
         paper, floating = (rival, mode) if found.floating else (mode, rival)
@@ -353,7 +353,7 @@ class LawSearch:
     def _with_rival(self, found: LawResult, starts: Starts) -> LawResult:
         """Return the law, and the other one as well where the recording cannot tell them."""
         blind = found.floating and self.search.passes.body.orientation == "none"
-        least = LAW.without_orientation if blind else LEAST_EVIDENCE
+        least = LAW.without_orientation if blind else SELECTION.least_evidence
         if self.assumptions.pressure_gradient != "auto" or found.settled_by >= least:
             return found
         rival = self._other_law(found, starts)

@@ -29,9 +29,10 @@ class ShapePolicy(NamedTuple):
     fewest_samples: int = 30
     """Samples of a cell that is looked at. Chosen by hand."""
     shortest_interval_s: float = 0.05
-    """Samples are added up over this time at least: no flow changes its shape at 10 Hz."""
+    """Samples are added up over this time at least: no flow changes its shape at 10 Hz; chosen by
+    hand."""
     oversampled: int = 2
-    """Frequencies for each period that the recording holds."""
+    """Frequencies for each period that the recording holds; chosen by hand."""
     block: int = 120
     """Frequencies in a block, whose median is the power without a line. Chosen by hand."""
     false_alarms: float = 1e-14

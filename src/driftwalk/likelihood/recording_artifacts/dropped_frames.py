@@ -31,20 +31,24 @@ from driftwalk.schema import Track
 from driftwalk.schema.tracking_noise import estimate_tracking_noise
 
 WIDTH: Final = 8
-"""Samples of a window, four on either side of the interval in question."""
+"""Samples of a window, four on either side of the interval in question; chosen by hand."""
 MIDDLE: Final = 3
 """Which of the window's intervals is the one in question."""
 MOST_MISSING: Final = 3
-"""Missing frames in one interval that are looked for."""
+"""Missing frames in one interval that are looked for; chosen by hand."""
 WINDOWS_AT_ONCE: Final = 16_384
 """Windows that are whitened at a time: some 50 MB."""
 CONTROL_LENGTHS: Final = (0.5, 1.5, 2.5)
 """Lengths that no dropped frame makes. Quick movements of an animal, or a clock that is not
-regular, make them as often as double ones."""
+regular, make them as often as double ones; chosen by hand."""
 DROPS: Final = tuple(range(1, MOST_MISSING + 1))
+"""Classes of a place: so many frames were dropped there."""
 CONTROL, WRONG, BOUNCE, JUMP = range(MOST_MISSING + 1, MOST_MISSING + 5)
+"""Further classes: a control length, a wrong place, a contact, a jump."""
 CLEAN: Final = 0
+"""Class of a place where nothing is wrong."""
 CLASSES: Final = JUMP + 1
+"""Number of classes, of which `JUMP` is the last."""
 
 
 class Axis(NamedTuple):
@@ -99,6 +103,7 @@ def patterns_of(lengths: Floats, stamped: float) -> list[Pattern]:
 
 
 _USUAL: Final = patterns_of(np.ones(WIDTH - 1), 1.0)
+"""Patterns of a window without a gap; those of others differ in their times alone."""
 KIND: Final = np.array([one.kind for one in _USUAL])
 """Of each pattern; the same for every window."""
 AT_MIDDLE: Final = np.array([one.at == MIDDLE for one in _USUAL])
@@ -196,9 +201,10 @@ class DroppedFramesPolicy(NamedTuple):
     """Share of the interval by which the stamps of a constant rate may be off: they may be rounded.
     Chosen by hand."""
     evidence: float = 30.0
-    """Log likelihood ratio from which on frames are missing. It is 0.0 on recordings of the model
-    at 10 Hz and at most 27 on recordings of animals and robots, but for one whose control says that
-    it means nothing; with one frame in twenty missing it is 128 and more after ten minutes."""
+    """Log likelihood ratio from which on frames are missing. Measured: it is 0.0 on recordings of
+    the model at 10 Hz and at most 27 on recordings of animals and robots, but for one whose control
+    says that it means nothing; with one frame in twenty missing it is 128 and more after ten
+    minutes."""
     most_control: float = 0.5
     """Share of the dropped frames' rate up to which the rate of the control lengths may go. Chosen
     by hand."""
@@ -206,7 +212,8 @@ class DroppedFramesPolicy(NamedTuple):
     """The same before any frame is found, when two in one window pass for something else. Chosen by
     hand."""
     rounds: int = 6
-    """Most rounds: frames that are found change what is expected of their neighbours."""
+    """Most rounds: frames that are found change what is expected of their neighbours; chosen by
+    hand."""
     first_rate: float = 3e-3
     """Rate of everything at which the expectation-maximisation begins. Chosen by hand."""
     longest_span: int = 21

@@ -20,11 +20,11 @@ class LeastNoisePolicy(NamedTuple):
     """Noise below which a track gets more (docs/explanation/likelihood.md)."""
 
     position_sides: float = 0.003
-    """Standard deviation of a position, in sides: 0.09 mm. Simulated recordings of a 3-cm block at
-    10 Hz are explained with 0.02 mm and more, and at 30 Hz not without any."""
+    """Standard deviation of a position, in sides: 0.09 mm. Measured: simulated recordings of a 3-cm
+    block at 10 Hz are explained with 0.02 mm and more, and at 30 Hz not without any."""
     orientation_rad: float = 0.005
-    """Standard deviation of the orientation: 0.29°. The same ones are explained with 0.2°, and not
-    with 0.15°."""
+    """Standard deviation of the orientation: 0.29°. Measured: the same ones are explained with
+    0.2°, and not with 0.15°."""
     without: float = 0.5
     """Share of this noise that the track's own is below, by two standard errors, where it gets
     more. Chosen by hand: cameras have two to six times the noise above."""

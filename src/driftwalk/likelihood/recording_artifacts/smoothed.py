@@ -29,35 +29,43 @@ class SmoothingPolicy(NamedTuple):
     segment: int = 64
     """Second differences in a segment; segments overlap by half. Chosen by hand."""
     fewest_segments: int = 8
-    """Segments of x and y together without which nothing is said: 16 s at 10 Hz."""
+    """Segments of x and y together without which nothing is said: 16 s at 10 Hz; chosen by hand."""
     lowest_frequency: float = 0.08
     """Cycles per sample: below, the flow rules the motion. Chosen by hand."""
     orbit_frequency: float = 0.2
-    """Cycles per sample: above, the evidence has to be clear too. Blocks in the core of an eddy
-    went round with 0.09 to 0.13 of them: such a line next to the noise looks like smoothing."""
+    """Cycles per sample: above, the evidence has to be clear too. Measured: blocks in the core of
+    an eddy went round with 0.09 to 0.13 of them: such a line next to the noise looks like
+    smoothing."""
     evidence: float = 50.0
-    """Log likelihood ratio from which on positions are smoothed. Recordings of the model reach 2,
-    300 random tracks 10; smoothed ones reach 50 in half a minute at 10 Hz."""
+    """Log likelihood ratio from which on positions are smoothed. Measured: recordings of the model
+    reach 2, 300 random tracks 10; smoothed ones reach 50 in half a minute at 10 Hz."""
     most_deviance_left: float = 0.15
-    """Share of the deviance of a motion and its noise that smoothing may leave. Smoothed recordings
-    of the model leave 0.01 of it; those of animals and robots, whose reason is another, 0.25 and
-    more."""
+    """Share of the deviance of a motion and its noise that smoothing may leave. Measured: smoothed
+    recordings of the model leave 0.01 of it; those of animals and robots, whose reason is another,
+    0.25 and more."""
     clearly: float = 10.0
     """Log likelihood ratio over all other ways of smoothing when a way is named. Chosen by hand."""
     independent: float = 0.36
     """Degrees of freedom of the spectrum in one of its numbers: neighbours in frequency and
-    overlapping segments are correlated by the taper."""
+    overlapping segments are correlated by the taper. Chosen by hand, below the 0.48 that white
+    noise has in closed form."""
+    uneven: float = 0.1
+    """Share of the usual interval by which one may differ within a segment; chosen by hand."""
 
 
 SMOOTHING: Final = SmoothingPolicy()
 FREQUENCIES: Final = 1024
-"""Frequencies of a spectrum before the taper, all around the circle."""
+"""Frequencies of a spectrum before the taper, all around the circle; chosen by hand."""
 TURN: Final = 2.0 * np.pi * np.arange(FREQUENCIES) / FREQUENCIES
+"""Frequencies around the circle [rad per sample]."""
 HANN: Final = np.hanning(SMOOTHING.segment + 2)[1:-1]
+"""Hann's window without its zeros at the ends."""
 TAPER: Final = HANN / np.sqrt((HANN**2).sum())
+"""The same of unit power, so that a spectrum keeps its level."""
 BAND: Final = slice(int(np.ceil(SMOOTHING.lowest_frequency * SMOOTHING.segment)), None)
 """Where a segment's spectrum is compared."""
 _SEEN_AT: Final = np.arange(SMOOTHING.segment // 2 + 1)[BAND] / SMOOTHING.segment
+"""Frequencies of the band [cycles per sample]."""
 
 
 class Smoothing(NamedTuple):
@@ -124,7 +132,7 @@ def _spectrum(track: Track) -> tuple[Floats, int]:
     if interval.size < SMOOTHING.segment + 1:
         return np.zeros(0), 0
     usual = float(np.median(interval))
-    breaks = np.flatnonzero(np.abs(interval - usual) > 0.1 * usual) + 1
+    breaks = np.flatnonzero(np.abs(interval - usual) > SMOOTHING.uneven * usual) + 1
     total, count = np.zeros(SMOOTHING.segment // 2 + 1), 0
     for first, last in zip([0, *breaks], [*breaks, track.time.size], strict=True):
         for axis in (track.x, track.y):

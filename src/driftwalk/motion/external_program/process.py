@@ -22,7 +22,7 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.text_files import MIB
 
 GRACE_S: Final = 1.0
-"""Time that a program has to end by itself."""
+"""Time that a program has to end by itself; chosen by hand."""
 # The same on Windows, where there are no sessions.
 _OWN_GROUP: Final[int] = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 

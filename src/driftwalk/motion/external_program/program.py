@@ -93,8 +93,10 @@ class FlowFile:
 
 
 TIMEOUT_S = 60.0
+"""Time for an answer [s], so that a program that hangs ends a run; chosen by hand."""
 
 PROBED_WORLDS: Final = np.array([1, 2], dtype=np.uint64)
+"""Two worlds, and the second alone: a world must not depend on what is simulated with it."""
 SCRIPTS: Final = (".py", ".jl", ".r", ".m", ".js", ".lua", ".rb", ".sh")
 """Names of files that an interpreter runs, by which a program is called rather than by that."""
 

@@ -32,7 +32,7 @@ from driftwalk.simulation.series import velocity_at
 NEIGHBOURS: Final = "neighbours"
 """The part that needs the other bodies of a recording."""
 LONGEST_STEP_S: Final = 0.02
-"""Time step, unless samples are so dense that half their interval is shorter."""
+"""Time step, unless samples are so dense that half their interval is shorter; chosen by hand."""
 
 
 class ParticleModel(NativeModel):

@@ -85,6 +85,8 @@ def assembly_sections(
         lambda found: assembly_summary(found, distribution_drawn, class_times, assembly, sizes),
         lambda _: _left_out(outcomes),
     )
+    # Each part is attempted alone: one that a damaged file spoils must not take the page with it.
+    # Of many blocks hardly two runs end in one class: their sizes stand instead.
     if outcomes and sizes is None:
         made += parts.attempt("classes", "Structures built", lambda: classes_section(outcomes))
     if sizes is not None:
@@ -292,7 +294,7 @@ def _left_out(found: dict[str, xr.Dataset]) -> list[str]:
 
 
 MOST_CURVES = 8
-"""Classes whose lifetimes are drawn, those with the most time."""
+"""Classes whose lifetimes are drawn, those with the most time; chosen by hand."""
 
 
 def steady_sections(steady: xr.Dataset) -> list[Section]:

@@ -19,8 +19,7 @@ from driftwalk.schema.answers.facts import facts_of, sentences
 from driftwalk.schema.answers.fit import model_estimates
 from driftwalk.schema.answers.force_law import (
     LINEAR_DRAG_ALONE,
-    MEMORY_SIGMAS,
-    OPENED_SIGMAS,
+    SELECTION,
     compared_laws,
     law_estimates,
     law_limits,
@@ -299,8 +298,9 @@ def _tested(fit: xr.Dataset) -> Section | None:
     ]
     note = (
         "The last score tests of the search: estimates of numbers that are not in the fit, in "
-        f"their standard deviations; 0 is the model. A number is fitted from {OPENED_SIGMAS:g} on "
-        f"(the memory of the force from {MEMORY_SIGMAS:g} on) if it is large enough to matter, and "
+        "their standard deviations; 0 is the model. A number is fitted from "
+        f"{SELECTION.opened_sigmas:g} on (the memory of the force from "
+        f"{SELECTION.memory_sigmas:g} on) if it is large enough to matter, and "
         "stays if the fit finds it too. Small errors of the fitted flow can look like a weaker "
         "one: the check of the model says whether anything is missing from it."
     )
@@ -310,7 +310,7 @@ def _tested(fit: xr.Dataset) -> Section | None:
 
 def _why(name: str, sigmas: float) -> str:
     """Return why a number that was tested is not in the fit."""
-    least = MEMORY_SIGMAS if name == "force_memory" else OPENED_SIGMAS
+    least = SELECTION.memory_sigmas if name == "force_memory" else SELECTION.opened_sigmas
     if not isfinite(sigmas):
         return "it has no estimate"
     # Chance exceeds two standard deviations in one test of twenty.

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 KINDS: Final = {"measured": 0, "filled": 1, "outside": 2}
 """How a page calls the origin of a node's value."""
 MOST_FRAMES: Final = 8
+"""Frames of a flow that a page shows, each a map of its own; chosen by eye."""
 
 
 def flow_sections(flow: xr.Dataset) -> list[Section]:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 GRAPH_PX: Final = 800.0
+"""Width for which a graph is laid out; a page scales it. Chosen by eye."""
 ROW_PX: Final = 78.0
 """Usual width of a page's graph, and height of a class with its name; chosen by eye."""
 

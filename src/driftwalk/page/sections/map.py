@@ -60,9 +60,11 @@ class PageParameter(NamedTuple):
 
 
 DRAG = PageParameter(BLOCK[0], "drag_coefficient", "1", "drag coefficient", "C_d", "linear", "drag")
+"""The drag of the block: column of a map, key, unit, label, symbol, scale and short name."""
 FORCE = PageParameter(
     BLOCK[1], "force_std_N", "N", "stochastic force", "σ_F", "linear", "stochastic force"
 )
+"""The same of the stochastic force."""
 
 
 def page_parameters(calibration: xr.Dataset) -> tuple[PageParameter, ...]:

@@ -151,6 +151,7 @@ def trajectory_section(
         if track.has_orientation
         else None,
     }
+    # Of all samples, whatever is shown; but over a gap a body is not seen to move.
     speed = np.hypot(np.diff(track.x), np.diff(track.y))[~gap] / interval[~gap]
     notes = [parts.SIMULATED] if is_simulated(trajectory) else []
     if every > 1:

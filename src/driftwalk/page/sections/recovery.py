@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MOST_WAYS: Final = 1000
-"""Combinations of length, angle and parameter, a row of the table each."""
+"""Combinations of length, angle and parameter, a row of the table each; chosen by hand."""
 MOST_PARAMETERS: Final = 100
-"""Parameters of a model that a page shows, with a chart each."""
+"""Parameters of a model that a page shows, with a chart each; chosen by hand."""
 
 
 def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:

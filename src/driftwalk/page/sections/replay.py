@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MOST_POSES: Final = 400_000
-"""Poses that a page holds; longer paths are shown more rarely, then fewer of them."""
+"""Poses that a page holds; longer paths are shown more rarely, then fewer of them; chosen by
+hand."""
 
 
 def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Section:

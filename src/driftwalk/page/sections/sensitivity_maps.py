@@ -26,10 +26,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MAP_AXES: Final = 2
+"""Axes of a map; a study with more is shown in slices."""
 NOT_REACHED: Final = "Blank if fewer than half of the runs reached it."
 MOST_SLICES: Final = 12
+"""Slices of a study that a page shows; chosen by eye."""
 MOST_COUNTS: Final = 6_000_000
-"""Numbers of runs that the maps of a page hold together: some 4 MB of it."""
+"""Numbers of runs that the maps of a page hold together: some 4 MB of it; chosen by hand."""
 
 
 def require_axes(sensitivity: xr.Dataset) -> None:

@@ -219,6 +219,7 @@ DRAG = PlotParameter(StoredParameter("drag_coefficient", "1", "C_d", "linear"), 
 FORCE = PlotParameter(
     StoredParameter("force_std", "N", "sigma_F", "linear"), r"$\sigma_F$", "mN", 1e3
 )
+"""The stochastic force, shown in millinewtons."""
 
 
 def plot_parameters(calibration: xr.Dataset) -> tuple[PlotParameter, ...]:

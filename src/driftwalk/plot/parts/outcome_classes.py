@@ -197,9 +197,11 @@ GAP: Final = 0.6
 # Font size of the names under sketches, and how wide its letters are [pt].
 NAME_SIZE_PT: Final = FONT_PT
 LETTER_PT: Final = 0.74 * NAME_SIZE_PT
+"""Mean width of a letter of a name, with room; measured on the font of the figures."""
 # Space between a sketch and its name [pt].
 NAME_GAP_PT: Final = 2.0
 MAX_CELL_PT: Final = 6.0
+"""Largest side of a block in a sketch [pt]; chosen by eye."""
 # Random starts from which a contact graph is laid out; with 8, all of up to 5 discs lie open.
 SKETCH_STARTS: Final = 8
 

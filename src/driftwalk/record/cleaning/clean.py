@@ -17,7 +17,7 @@ from driftwalk.record.cleaning.warn import refuse_many_bodies
 from driftwalk.record.raw import Array, RawBody
 
 LARGEST_SHARE = 0.01
-"""Share of the times at which a tracker's slip may have left two places."""
+"""Share of the times at which a tracker's slip may have left two places; chosen by hand."""
 
 BodyColumns = Callable[[bool], list[str]]
 """Returns the columns that could name the body; the argument: whether times must be in order."""

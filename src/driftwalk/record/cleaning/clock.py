@@ -23,11 +23,12 @@ class ClockPolicy(NamedTuple):
     """Interval beyond which milliseconds of a video are likelier than so slow a camera; chosen
     by hand."""
     last_day_s: float = 1e10
-    """Seconds since 1970 until the year 2286."""
+    """Seconds since 1970 until the year 2286; chosen by hand."""
     first_day_s: float = 1e8
     """Three years: a clock beyond them counts from 1970; chosen by hand."""
     longest_recording_s: float = 1e12
-    """30,000 years; powers of much longer times are beyond float64."""
+    """30,000 years; by the range of float64, in closed form: powers of much longer times are beyond
+    float64."""
     first_serial: float = 15_000.0
     """Days since 1900 of the year 1941, as spreadsheets count them; chosen by hand."""
     last_serial: float = 80_000.0
@@ -36,6 +37,8 @@ class ClockPolicy(NamedTuple):
     """Shortest interval of a likely camera [s]; chosen by hand."""
     slowest_s: float = 2.0
     """Longest interval of a likely camera [s]; chosen by hand."""
+    of_calendar: float = 0.9
+    """Share of the steps that are whole hours in a calendar; chosen by hand."""
 
 
 CLOCK: Final = ClockPolicy()
@@ -106,7 +109,7 @@ def _steps(clocks: list[Array]) -> Array:
 
 def _whole_hours(steps: Array) -> bool:
     """Whether the steps are those of a calendar: one sample every six hours, or a day."""
-    return bool((steps % 3600.0 == 0.0).mean() > 0.9)
+    return bool((steps % 3600.0 == 0.0).mean() > CLOCK.of_calendar)
 
 
 def _remedy(column: str, first: float, interval: float) -> str:
@@ -145,10 +148,14 @@ class CounterPolicy(NamedTuple):
     chosen by hand."""
     seldom: float = 0.05
     """Share of the steps that go back, up to which the clock starts over; chosen by hand."""
+    own: float = 0.9
+    """Share of the times that are of one part alone, with fewer of which the parts are bodies;
+    chosen by hand."""
 
 
 COUNTER: Final = CounterPolicy()
 _BITS: Final = (8, 10, 12, 15, 16, 20, 24, 31, 32)
+"""Widths of counters of cameras and controllers that are known to roll over."""
 
 
 def unwrap_counters(raw: RawRecording) -> list[str]:
@@ -221,7 +228,7 @@ def overlap(clock: Array) -> bool:
 
     Parts with most of their times in common are several bodies, which another check refuses.
     """
-    if np.unique(clock).size < 0.9 * clock.size:
+    if np.unique(clock).size < COUNTER.own * clock.size:
         return False
     starts = np.append(0, np.flatnonzero(np.diff(clock) < 0) + 1)
     ends = np.append(starts[1:], clock.size) - 1

@@ -21,18 +21,18 @@ class JumpPolicy(NamedTuple):
     """Which samples and steps are impossible."""
 
     effort: float = 0.5
-    """Cost of a step at the greatest speed, in samples that are left out. With a half, no
-    sample is left out that is within reach of both its neighbours."""
+    """Cost of a step at the greatest speed, in samples that are left out. In closed form: with a
+    half, no sample is left out that is within reach of both its neighbours."""
     longest_excursion: int = 300
     """Samples back to which each is tried as the one before; earlier, only the best of all is;
     chosen by hand."""
     arena_share: float = 0.25
-    """Share of the arena's diagonal from which on a step can be impossible. In recordings
-    without a fault, a fish that darts stays below 0.22, seen 1.5 to 30 times a second, and
-    robots that kick each other below 0.18; trackers that slip do so by 0.25 to 0.8."""
+    """Share of the arena's diagonal from which on a step can be impossible. Measured: in recordings
+    without a fault, a fish that darts stays below 0.22, seen 1.5 to 30 times a second, and robots
+    that kick each other below 0.18; trackers that slip do so by 0.25 to 0.8."""
     alone: float = 5.0
-    """Least length of an impossible step, in lengths of the steps around it. A fast body takes
-    long steps one after the other; a slip of a tracker was 16 times as long or more."""
+    """Least length of an impossible step, in lengths of the steps around it. A fast body takes long
+    steps one after the other; measured, a slip of a tracker was 16 times as long or more."""
     around: int = 3
     """Steps before and after that are looked at. The longest of them does not count: it may be
     the way back; chosen by hand."""
@@ -43,7 +43,7 @@ class JumpPolicy(NamedTuple):
 
 JUMPS: Final = JumpPolicy()
 PART: Final = 1 << 20
-"""Samples that are compared at once, some 16 MB: a recording may have millions."""
+"""Samples that are compared at once, some 16 MB: a recording may have millions; chosen by hand."""
 
 
 def find_jumps(body: RawBody, max_speed: float) -> Integers:

@@ -18,19 +18,20 @@ class MissingPolicy(NamedTuple):
     """When samples look like marks of a body that was not seen; chosen by hand."""
 
     far: float = 8.0
-    """Lengths of the usual step beyond which a place is far from its neighbours."""
+    """Lengths of the usual step beyond which a place is far from its neighbours; chosen by hand."""
     far_whole: float = 4.0
-    """The same of a place whose numbers are whole, such as 0 or -1."""
+    """The same of a place whose numbers are whole, such as 0 or -1; chosen by hand."""
     fewest: int = 2
-    """Samples in such a place that are a mark."""
+    """Samples in such a place that are a mark; chosen by hand."""
     any_place: int = 4
-    """Samples in any other place that are a mark."""
+    """Samples in any other place that are a mark; chosen by hand."""
     held: int = 3
-    """Rows in one place, in a body that moves otherwise, after which a leap shows a mark."""
+    """Rows in one place, in a body that moves otherwise, after which a leap shows a mark; chosen by
+    hand."""
     moving: float = 0.5
-    """Share of the steps in which such a body moves."""
+    """Share of the steps in which such a body moves; chosen by hand."""
     leap: float = 2.0
-    """Least length of such a leap, in lengths of the usual step."""
+    """Least length of such a leap, in lengths of the usual step; chosen by hand."""
 
 
 MARK: Final = MissingPolicy()

@@ -121,11 +121,13 @@ class ExtentPolicy(NamedTuple):
     """Places beyond that for each sample: bodies come and go, as fragments of tracks do; chosen
     by hand."""
     farthest_m: float = 1e12
-    """Farthest position, beyond the planets [m]: float64 must hold its powers."""
+    """Farthest position, beyond the planets [m]: by definition of float64, which must hold its
+    powers."""
     nearest_m: float = 1e-25
-    """If all positions are nearer to the origin, their powers are 0 in float64 [m]."""
+    """If all positions are nearer to the origin, by definition of float64 their powers are 0
+    [m]."""
     largest_angle: float = 1e12
-    """In the file's unit; of larger angles float64 does not know the fraction of a turn."""
+    """In the file's unit; by definition float64 does not know the fraction of a turn."""
 
 
 EXTENT: Final = ExtentPolicy()

@@ -315,7 +315,6 @@ def _values(value: Any) -> Array:
 
 
 def _one_number(value: Any, otherwise: float) -> float:
-    """Return the one number of a field."""
     known = isinstance(value, np.ndarray) and value.size == 1 and value.dtype.kind in "fiu"
     return float(value.ravel()[0]) if known else otherwise
 

@@ -34,8 +34,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 OF_DEEPLABCUT: Final = (0.6, "DeepLabCut's pcutoff")
+"""Least likelihood of a point that is read, as DeepLabCut itself has it."""
 OF_SLEAP: Final = (0.2, "SLEAP's threshold of peaks")
+"""The same as SLEAP has it."""
 OF_MOVEMENT: Final = (0.6, "movement's threshold")
+"""The same as the package movement has it."""
 
 
 def _places(columns: Iterable[tuple[int, tuple[str, ...]]]) -> dict[str, dict[str, dict[str, int]]]:

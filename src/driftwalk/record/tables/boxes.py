@@ -25,6 +25,7 @@ _STATED: Final = re.compile(
 )
 _CORNERS: Final = ("x1", "y1", "x2", "y2")
 _QUAD: Final = tuple(f"{axis}{corner}" for corner in range(1, 5) for axis in "xy")
+"""Corners of a box in turn, as x1, y1 to x4, y4."""
 _FROM_ZERO: Final = {"x0": "x1", "y0": "y1", "x1": "x2", "y1": "y2"}
 _OF_QUAD: Final = re.compile(r"(?:tag)?(?:c|corner|p|pt)([0-4])([xy])")
 
@@ -33,13 +34,16 @@ class BoxPolicy(NamedTuple):
     """When four numbers are the corners of a box; chosen by hand."""
 
     spread: float = 0.5
-    """Largest range of the sides of a box, as a share of the range of its centre."""
+    """Largest range of the sides of a box, as a share of the range of its centre; chosen by
+    hand."""
     skew: float = 0.15
-    """Largest departure of four corners from a parallelogram, in diagonals."""
+    """Largest departure of four corners from a parallelogram, in diagonals; chosen by hand."""
     square: float = 1.25
-    """Ratio of the sides up to which a box is a square: it looks the same after a quarter turn."""
+    """Ratio of the sides up to which a box is a square: it looks the same after a quarter turn;
+    chosen by hand."""
     full: float = 1.05
-    """Range of an angle, in its periods, beyond which it is the angle of a direction."""
+    """Range of an angle, in its periods, beyond which it is the angle of a direction; chosen by
+    hand."""
 
 
 BOX: Final = BoxPolicy()

@@ -40,6 +40,8 @@ class UnevenClockPolicy(NamedTuple):
     one row to the next; chosen by hand."""
     turns: float = 1.5
     """The same where bodies take turns, of medians; chosen by hand."""
+    back: float = 0.1
+    """Share of the steps that may go back in a column that starts over; chosen by hand."""
 
 
 _ORDER: Final = UnevenClockPolicy()
@@ -180,7 +182,7 @@ def _starts_over(values: Array) -> bool:
     back = steps < 0
     if not back.any():
         return bool(counts[0] > 1 and (counts == counts[0]).all() and steps.max() == 1.0)
-    return bool((steps[~back] == 1.0).mean() > _ORDER.own and back.mean() < 0.1)
+    return bool((steps[~back] == 1.0).mean() > _ORDER.own and back.mean() < _ORDER.back)
 
 
 def _leaps(codes: Codes, x: Array, y: Array) -> bool:

@@ -33,8 +33,9 @@ from driftwalk.record.text import Table
 from driftwalk.record.vocabulary import words
 
 _FULL_TURN: Final = 6.3
-"""A full turn in radians, with room for rounding."""
+"""A full turn in radians, with room for rounding; chosen by hand."""
 _FLAGS: Final = {**dict.fromkeys(words("yes"), 1.0), **dict.fromkeys(words("no"), 0.0)}
+"""Words of a column that says yes or no, as numbers."""
 NAME_THE_CLOCK = (
     'no column is known to hold times or frames: name it with `columns={"t": "NAME:s"}` or '
     '`columns={"frame": "NAME"}`; if there is none, give `frame_rate`, and every row counts as '

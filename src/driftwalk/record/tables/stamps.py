@@ -16,7 +16,9 @@ Ticks = Integers
 Texts = npt.NDArray[np.bytes_]
 
 SECOND_NS: Final = 1_000_000_000
+"""Nanoseconds of a second."""
 DAY_NS: Final = 86_400 * SECOND_NS
+"""Nanoseconds of a day without a leap second, as in POSIX time."""
 _BYTES: Final = 201
 """More bytes than a time stamp has, of some 40 as a rule; chosen by hand."""
 NO_TIME: Final = int(np.iinfo(np.int64).min)
@@ -182,13 +184,7 @@ def how_to_write(text: str) -> str:
 
 
 def _ascii(texts: Texts) -> Texts:
-    """Return texts in an array as wide as the longest of them; a word that is no ASCII is empty.
-
-    Raises
-    ------
-    RowError
-        At a text that is too long, or no ASCII and no word for a missing time.
-    """
+    """Return texts in an array as wide as the longest of them; a word that is no ASCII is empty."""
     letters = texts.view(np.uint8).reshape(texts.size, -1)
     highest = letters.max(axis=0, initial=0)
     if highest.max() > 127 or highest[_BYTES - 1 :].any():

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 MOST_ROWS: Final = 16
-"""Classes in the table: all 12 of four blocks, and the frequent ones of more."""
+"""Classes in the table: all 12 of four blocks, and the frequent ones of more; chosen by hand."""
 SHOWN_TIMES: Final = 4
 """Times in the table of sizes, equally far apart, the last one the end of the runs."""
 _OVER_TIME: Final = {
@@ -95,6 +95,7 @@ def assembly_answer(
         parts.append(_classes(found, drawn))
     else:
         parts += _sizes(found, sizes, "parameters found" if drawn is not None else "")
+        # Many blocks hardly ever end in the same class: sizes are compared there, not classes.
         if drawn is not None and sizes_drawn is not None:
             parts += _sizes(drawn, sizes_drawn, "parameters drawn")
     for event in ("first_contact", "completion"):

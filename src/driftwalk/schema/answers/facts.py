@@ -54,8 +54,18 @@ class AnswerParts(NamedTuple):
     """Those that have no place in a variable."""
 
 
-FAR_ABOVE_FLOOR: Final = 2.0
-"""A KS distance of more noise floors than this is called far above the floor. Chosen by hand."""
+class GoodnessPolicy(NamedTuple):
+    """When a distance is more than what chance makes of two recordings of one model."""
+
+    far_above_floor: float = 2.0
+    """Noise floors of a KS distance above which it is called far above the floor; chosen by
+    hand."""
+    floor_quantile: float = 0.95
+    """Quantile of the distances between two simulated recordings up to which the floor reaches:
+    chance exceeds it once in twenty."""
+
+
+GOODNESS: Final = GoodnessPolicy()
 
 
 def facts_of(dataset: xr.Dataset) -> dict[str, Any]:

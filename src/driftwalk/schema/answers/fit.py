@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.errors import InputError
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import (
-    FAR_ABOVE_FLOOR,
+    GOODNESS,
     facts_of,
     flat_variables,
     is_open,
@@ -47,7 +47,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 TELLING_SHARE: Final = 0.02
-"""Share of the intervals at the wall from which there may be enough contacts to estimate it."""
+"""Share of the intervals at the wall from which there may be enough contacts to estimate it; chosen
+by hand."""
 _ATTRIBUTES: Final = (
     *("angle", "force_law", "force_law_stated", "drag_law", "drag_law_stated", "wall_left_out"),
     *("measured_flow", "measured_flow_errors"),
@@ -191,7 +192,7 @@ def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
     if not isfinite(distance):
         return [*parts, Row("KS distance", f"not available: {check.attrs['ks_left_out']}")]
     explains = verdict is not None and verdict.explains
-    far = explains and distance > FAR_ABOVE_FLOOR * floor
+    far = explains and distance > GOODNESS.far_above_floor * floor
     more = ": far, but within the uncertainty of the fit" if far else ""
     parts.append(Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{more}"))
     chance = float(check.attrs.get("ks_p_value", "nan"))

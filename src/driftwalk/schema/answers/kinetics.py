@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import sentences
@@ -49,12 +49,23 @@ def kinetics_answer(found: xr.Dataset) -> Answer:
     return Answer(parts, _facts(found, reasons), [])
 
 
+class EqualRatesPolicy(NamedTuple):
+    """When the rates of two data sets differ."""
+
+    level: float = 0.05
+    """Corrected p-value up to which equal rates are refused: one false alarm in
+    twenty comparisons."""
+
+
+EQUAL_RATES: Final = EqualRatesPolicy()
+
+
 def equal_words(found: xr.Dataset) -> str:
     """Return whether the rates of two data sets differ, in words."""
     p = float(found.attrs["equal_p"])
     if not math.isfinite(p):
         return "cannot tell: no transition has five events"
-    word = "refused" if p <= 0.05 else "not refused"
+    word = "refused" if p <= EQUAL_RATES.level else "not refused"
     return f"{word}: smallest corrected p = {p:.2g}"
 
 

@@ -121,7 +121,6 @@ def _verdict(one: xr.Dataset) -> str:
 
 
 def _model(one: xr.Dataset) -> dict[str, Any]:
-    """Return a model for programs."""
     ends, summaries = one["end_score"].values, {}
     if "asked" in one and bool(one["asked"]):
         names = ("misfit", "usual_misfit", "most_misfit", "unlikely")

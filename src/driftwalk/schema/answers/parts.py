@@ -17,8 +17,9 @@ NOT_DETERMINED: Final = "not determined by this recording"
 """Stands in place of a number with an open interval."""
 SIMULATED: Final = "This recording was simulated, not measured."
 LABEL_WIDTH: Final = 22
+"""Column of the values in a terminal: most labels are shorter; chosen by eye."""
 DIGITS: Final = 4
-"""Significant digits of a number; more where its interval is narrower."""
+"""Significant digits of a number; more where its interval is narrower; chosen by hand."""
 
 
 class Row(NamedTuple):

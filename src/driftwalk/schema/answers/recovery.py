@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -24,16 +24,29 @@ _TRUTH: Final = (
     *("sample_interval_s", "recordings_per_fit", "missing_share", "seed", "confidence"),
     "coverage_confidence",
 )
-NOTABLE_BIAS: Final = 0.05
-NOTABLE_STANDARD_ERRORS: Final = 3.0
-NOTABLE_EXCESS: Final = 2.0
-"""In standard errors of the logarithm of an rms."""
+
+
+class NotablePolicy(NamedTuple):
+    """When a recovery study says that an error is more than the fits state."""
+
+    bias: float = 0.05
+    """Mean relative error of C_d that is always tolerated; chosen by hand."""
+    standard_errors: float = 3.0
+    """Standard errors of a mean beyond which it is a bias: chance exceeds them once in 370."""
+    excess: float = 2.0
+    """Standard errors of the logarithm of an rms beyond which errors do not shrink with the length:
+    chance exceeds them once in 44."""
+
+
+NOTABLE: Final = NotablePolicy()
+
 _COLUMNS: Final = ("length", "angle", "of", "median |error|", "90 % within", "bias", "rms z")
 _SET_UP: Final = (
     *("duration_s", "sample_rate_Hz", "missing_share", "position_noise_m", "noise"),
     *("confidence", "seed"),
 )
 _STATUS: Final = {1: "could not be calibrated", 2: "could not be simulated"}
+"""Words for a data set without an answer, by its status."""
 _MODEL_SUMMARY: Final = (
     *("truth", "median_error", "determined_median_error", "determined_share", "coverage"),
     "coverage_standard_error",
@@ -126,7 +139,7 @@ def _doubts(part: xr.Dataset) -> list[str]:
     value = _summary(part, "drag_coefficient")
     chance = value["spread"] / np.sqrt(max(used, 1))
     said = []
-    if abs(value["bias"]) > max(NOTABLE_BIAS, NOTABLE_STANDARD_ERRORS * chance):
+    if abs(value["bias"]) > max(NOTABLE.bias, NOTABLE.standard_errors * chance):
         said.append(
             f"C_d is off by {in_percent(value['bias'], sign=True)} on average, where chance gives "
             f"{in_percent(chance)}: more recordings do not help, and only a comparison of "
@@ -139,7 +152,7 @@ def _doubts(part: xr.Dataset) -> list[str]:
             f"factor of about {value['rms_z']:.1f}"
         )
     excess = _excess(part, value["rms_error"])
-    if excess > np.exp(NOTABLE_EXCESS / np.sqrt(2.0 * max(used, 1))):
+    if excess > np.exp(NOTABLE.excess / np.sqrt(2.0 * max(used, 1))):
         said.append(
             f"the error of C_d is {excess:.1f} times what the square root of the length gives: do "
             "not trust the length to record"

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LISTED_COMPONENTS: Final = 3
+"""Components whose shares are listed: with three of them, most of the variance is said."""
 _REFERENCE: Final = (
     *("complete", "runs", "realisations", "left_out", "blocks", "latching", "hidden_face_drag"),
     *("drag_coefficient", "force_std_N", "force_interval_s"),
@@ -59,6 +60,7 @@ def sensitivity_answer(
         f"reference: {facts['blocks']} blocks, C_d = {facts['drag_coefficient']:.4g}, "
         f"σ_F = {1e3 * facts['force_std_N']:.4g} mN, {facts['realisations']} realisations",
         _reference_table(reference),
+        # Said before the map: a distance below it is no difference.
         f"l1 distance of two realisations: {facts['mean_pairwise_l1']:.4f} on average; "
         f"{facts['expected_pairwise_l1']:.4f} is expected from the number of runs alone",
         *_distances(l1, smallest),

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 NAMES: Final = tuple(one.name for one in AXES)
 LISTED: Final = 12
-"""Settings of a table; a search has more."""
+"""Settings of a table; a search has more; chosen by hand."""
 NAMED: Final = 4
-"""Settings that a sentence names, next to the best."""
+"""Settings that a sentence names, next to the best; chosen by hand."""
 NUMBERS: Final = (
     *("runs", "reached", "fresh_runs"),
     *(f"{name}{end}" for name in ("fresh_yield", "difference") for end in ("", "_low", "_high")),

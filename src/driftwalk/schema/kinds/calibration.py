@@ -19,6 +19,7 @@ QUADRANTS: Final = {
     name: at - 1
     for at, name in enumerate(("none", "left_below", "right_below", "left_above", "right_above"))
 }
+"""Quadrants about the point of the largest difference, as the native core numbers them."""
 
 _BLOCK: Final = (
     StoredParameter("drag_coefficient", "1", "C_d", "linear"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from driftwalk.schema.description import Variable, attributes, kind
 
@@ -111,8 +111,16 @@ attributes (the flow began again):
 """)
 """Attributes of whatever was simulated in a flow."""
 
-SUDDEN: Final = 3.0
-"""Times the usual change between frames from which on a loop is said not to close."""
+
+class LoopPolicy(NamedTuple):
+    """When a flow that begins again has a jump."""
+
+    sudden: float = 3.0
+    """Times the usual change between frames from which on a loop is said not to close; chosen by
+    hand."""
+
+
+LOOP: Final = LoopPolicy()
 
 _GOES_ON: Final = {
     "none": "changes in time",
@@ -169,7 +177,7 @@ def flow_series_words(attrs: Mapping[str, Any], *, holds: str = "") -> list[str]
             "the chance of starts and forces alone"
         )
     words = [what + begins]
-    if float(attrs.get("flow_join", 0.0)) > SUDDEN:
+    if float(attrs.get("flow_join", 0.0)) > LOOP.sudden:
         words.append(
             "the flow series does not close: from its last frame to its first the water changes "
             f'{attrs["flow_join"]:.3g} times as much as between frames; `flow.repeat="mirror"` '

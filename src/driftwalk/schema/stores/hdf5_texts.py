@@ -30,7 +30,7 @@ MOST_NUMBER: Final = 0xFFFF
 """Of a text in its collection."""
 MOST_SEARCHED: Final = 512 * MIB
 """Bytes that are looked through, for some tenths of a second; what a larger file or one with many
-collections holds beyond them is left to the library."""
+collections holds beyond them is left to the library; chosen by hand."""
 
 
 def refuse_endless_texts(path: Path) -> None:

@@ -14,8 +14,9 @@ from driftwalk.core.errors import FormatError
 from driftwalk.schema.stores.netcdf import most_bytes, refuse_huge
 
 MOST_ELEMENTS: Final = 200_000
-"""Elements of an array of structs or cells that are read."""
+"""Elements of an array of structs or cells that are read; chosen by hand."""
 _SIZES: Final = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "single": 4, "logical": 1}
+"""Bytes of an element by MATLAB's class; all others have 8."""
 OLD: Final = b"MATLAB 5.0 MAT-file"
 """Start of the format that MATLAB writes unless a user chooses another."""
 HDF5_BASED: Final = b"MATLAB 7.3 MAT-file"
@@ -131,10 +132,13 @@ def _hdf5_variables(path: Path) -> list[str]:
 _BEGIN: Final = 128
 """Bytes of text, version and byte order before the first variable."""
 _MATRIX: Final = 14
+"""Number of the type of an array (miMATRIX in MATLAB's description of MAT-files)."""
 _COMPRESSED: Final = 15
+"""Number of the type of a compressed element (miCOMPRESSED)."""
 _KNOWN: Final = frozenset({*range(1, 8), 9, 12, 13, _MATRIX, 16, 17, 18})
 """Numbers of the types that an element inside a variable may have."""
 _TAG: Final = 8
+"""Bytes of a tag: two numbers of 32 bits, type and size."""
 
 
 def refuse_unknown_elements(path: Path) -> None:

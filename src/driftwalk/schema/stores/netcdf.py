@@ -28,13 +28,12 @@ HDF5: Final = b"\x89HDF\r\n\x1a\n"
 MAGIC: Final = (HDF5, b"CDF\x01", b"CDF\x02")
 
 ALLOWANCE_BYTES: Final = 128 * MIB
-"""Memory that any file may declare, however small the file is."""
+"""Memory that any file may declare, however small the file is; chosen by hand."""
 LARGEST_RATIO: Final = 500
-"""How much more a file may hold in memory than on the disk, beyond that.
-
-Deflate, the filter that NetCDF uses, shrinks nothing by more than 1032, and that only where every
-byte is the same. Positions with digits of their own shrink by 10 at most, by 100 where nearly all
-of them are missing."""
+"""How much more a file may hold in memory than on the disk, beyond that. Deflate, the filter that
+NetCDF uses, shrinks nothing by more than 1032, and that only where every byte is the same.
+Positions with digits of their own shrink by 10 at most, by 100 where nearly all of them are
+missing; chosen by hand."""
 _WIDTH: Final = 8
 """Bytes of a number in memory at least: packed ones are unpacked to doubles."""
 

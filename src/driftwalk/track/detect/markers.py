@@ -16,7 +16,8 @@ from driftwalk.model.section import Quantity, Section
 from driftwalk.track.toml_file import load_sections, save_sections
 from driftwalk.track.types import Image
 
-_LEAST_HUE_DIFFERENCE = math.radians(30.0)
+LEAST_HUE_DIFFERENCE = math.radians(30.0)
+"""Between the two colours of a marker: a camera turns hues by some degrees. Chosen by hand."""
 _HEAD = """\
 Two-colour marker: two discs side by side on each block.
 Colours are a* and b* of CIELAB; brightness does not count."""
@@ -94,10 +95,10 @@ class TwoColourMarker(Section):
     @model_validator(mode="after")
     def _distinct(self) -> Self:
         between = hue_difference(self.colour_1, self.colour_2)
-        if between < _LEAST_HUE_DIFFERENCE:
+        if between < LEAST_HUE_DIFFERENCE:
             raise ConfigurationError(
                 f"the hues of the two colours differ by {math.degrees(between):.0f}°; "
-                f"at least {math.degrees(_LEAST_HUE_DIFFERENCE):.0f}° are needed to tell them apart"
+                f"at least {math.degrees(LEAST_HUE_DIFFERENCE):.0f}° are needed to tell them apart"
             )
         if self.spacing_m < 0.8 * self.size_m:
             raise ConfigurationError(

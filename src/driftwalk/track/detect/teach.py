@@ -15,6 +15,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.core.units import in_percent
 from driftwalk.track.detect.markers import (
+    LEAST_HUE_DIFFERENCE,
     ChromaTables,
     MarkerColour,
     TwoColourMarker,
@@ -42,11 +43,23 @@ class TeachPolicy(NamedTuple):
     round: float = 0.6
     """Least share of its bounding box that a disc fills, and least ratio of its sides; chosen
     by hand."""
+    hue_deg: float = 20.0
+    """Hues about a peak that are one colour [degrees]; chosen by hand."""
+    inner: float = 0.8
+    """Part of the strong chroma (its 90 % quantile) above which a pixel is within a disc; chosen by
+    hand."""
+    spacing_off: float = 0.15
+    """Share of the usual spacing by which that of a pair may differ; chosen by hand."""
+    size_off: float = 0.25
+    """Share of the usual diameter by which that of a pair may differ; chosen by hand."""
+    nearest: float = 0.8
+    """Least spacing of two discs, in diameters; chosen by hand."""
+    farthest: float = 6.0
+    """Largest spacing of two discs, in diameters; chosen by hand."""
 
 
 _TEACH: Final = TeachPolicy()
 
-_LEAST_HUE_DIFFERENCE: Final = math.radians(30.0)
 _NAMES: Final = (
     ("red", 25.0),
     ("orange", 60.0),
@@ -56,6 +69,7 @@ _NAMES: Final = (
     ("blue", 285.0),
     ("magenta", 330.0),
 )
+"""Hue of each colour in CIELAB [degrees]; the nearest names a disc."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +154,7 @@ def colours_seen(images: Sequence[Image]) -> list[ColourSeen]:
     found = []
     for index in np.flatnonzero(peak):
         centre = (index + 0.5) * 2 * math.pi / _TEACH.bins - math.pi
-        near = np.abs(np.angle(np.exp(1j * (hue - centre)))) < math.radians(20.0)
+        near = np.abs(np.angle(np.exp(1j * (hue - centre)))) < math.radians(_TEACH.hue_deg)
         seen = _describe(a_star[coloured][near], b_star[coloured][near], chroma.size)
         if seen is not None:
             found.append(seen)
@@ -238,7 +252,7 @@ def propose_markers(
     best: tuple[int, float, TwoColourMarker, list[tuple[int, Disc, Disc]]] | None = None
     for first, second in combinations(seen, 2):
         ordered = sorted((first.colour, second.colour), key=lambda c: c.hue_rad % (2 * math.pi))
-        if hue_difference(*ordered) < _LEAST_HUE_DIFFERENCE:
+        if hue_difference(*ordered) < LEAST_HUE_DIFFERENCE:
             continue
         tried = _measure(cv2, images, camera, ordered, block_side)
         if tried is not None and (best is None or (tried[0], -tried[1]) > (best[0], -best[1])):
@@ -278,10 +292,14 @@ def _measure(
     if not pairs:
         return None
     spacing, size = float(np.median(distances)), float(np.median(diameters))
-    agree = np.abs(np.array(distances) - spacing) < 0.15 * spacing
-    agree &= np.abs(np.array(diameters) - size) < 0.25 * size
+    agree = np.abs(np.array(distances) - spacing) < _TEACH.spacing_off * spacing
+    agree &= np.abs(np.array(diameters) - size) < _TEACH.size_off * size
     number = int(agree.sum())
-    if number * 2 < len(pairs) or spacing < 0.8 * size or spacing > 6.0 * size:
+    if (
+        number * 2 < len(pairs)
+        or spacing < _TEACH.nearest * size
+        or spacing > _TEACH.farthest * size
+    ):
         return None
     marker = TwoColourMarker(
         # To a hundredth of a millimetre.
@@ -340,7 +358,7 @@ def _describe(a_star: Floats, b_star: Floats, pixels: int) -> ColourSeen | None:
     if a_star.size < max(_TEACH.least_share * pixels, _TEACH.least_area_px):
         return None
     # Edges are mixed with their surroundings; the strongest colour is the disc's own.
-    inner = chroma > 0.8 * np.quantile(chroma, 0.9)
+    inner = chroma > _TEACH.inner * np.quantile(chroma, 0.9)
     a, b = float(np.median(a_star[inner])), float(np.median(b_star[inner]))
     spread = float(np.clip(np.hypot(a_star[inner] - a, b_star[inner] - b).std(), 2.0, 20.0))
     colour = MarkerColour(a_star=round(a, 1), b_star=round(b, 1), spread=round(spread, 1))
@@ -348,7 +366,6 @@ def _describe(a_star: Floats, b_star: Floats, pixels: int) -> ColourSeen | None:
 
 
 def _name(hue_rad: float) -> str:
-    """Return the word for a hue."""
 
     def off(degrees: float) -> float:
         return abs(math.remainder(hue_rad - math.radians(degrees), 2 * math.pi))

@@ -39,6 +39,7 @@ class CentrePolicy(NamedTuple):
 CENTRES: Final = CentrePolicy()
 
 _KERNEL: Final = np.exp(-0.5 * (np.arange(-1.0, 2.0) / CENTRES.smoothing_px) ** 2)
+"""Gaussian of three pixels; it is normalised where it is used."""
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,9 @@ class OutlinePolicy(NamedTuple):
 _OUTLINE: Final = OutlinePolicy()
 
 _TURNS: Final = np.radians(np.arange(-40.0, 41.0, 8.0))
+"""Turns from which the fit of outlines begins [rad]; chosen by hand."""
 _SWINGS: Final = np.radians(np.arange(-60.0, 60.1, 0.5))
+"""Directions about the held disc whose fit is looked at [rad]; chosen by hand."""
 
 
 def outlined_centres(

@@ -436,7 +436,6 @@ class TwoColourDetector:
         )
 
     def _place(self, measured: list[tuple[Pair, Measured]]) -> list[Detection]:
-        """Return the detections in the world."""
         if not measured:
             return []
         centres = np.concatenate([result.centres for _, result in measured])

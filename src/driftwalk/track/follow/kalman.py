@@ -18,6 +18,7 @@ from driftwalk.schema.trajectory import wrap_angle
 from driftwalk.track.follow.settings import Motion, TrackerSettings
 
 STATES = 6
+"""Position, angle, and their rates."""
 
 
 def start_state(

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 STRETCH_S: Final = 300.0
-"""Time that is simulated at once [s]."""
+"""Time that is simulated at once [s]; chosen by hand."""
 
 
 class MovingBodies:

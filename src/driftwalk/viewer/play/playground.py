@@ -165,7 +165,7 @@ def _event(event: LiveEvent, joined: Sequence[tuple[int, int, int, int]]) -> dic
 
 
 ROUNDING: Final = 1e-6
-"""Share of a time step within which an instant is that of the step's end."""
+"""Share of a time step within which an instant is that of the step's end; chosen by hand."""
 
 
 def shape_counts(outcome: str, assembly: npt.NDArray[np.int32]) -> Counter[str]:

@@ -32,10 +32,13 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 POSITION_DIGITS: Final = 5
+"""Decimals of a position [m]: a hundredth of a millimetre, below a pixel of any screen."""
 SETTLED_S: Final = 0.3
-"""Time after the last change of a setting at which all browsers receive the values in force [s]."""
+"""Time after the last change of a setting at which all browsers receive the values in force [s];
+chosen by hand."""
 LONGEST_ADVANCE_S: Final = 0.1
-"""Longest time for which the tank is advanced at once [s]; on a slow machine it falls behind."""
+"""Longest time for which the tank is advanced at once [s]; on a slow machine it falls behind;
+chosen by hand."""
 ACTIONS: Final[dict[str, str]] = {
     "restart": "restart",
     "pause": "pause",
@@ -261,7 +264,6 @@ class Playground(Source):
         return section("controls", "controls", "Settings", self.controls_note, items=items)
 
     def _page(self) -> dict[str, Any]:
-        """Return the whole page."""
         recording = None if self.recording is None else self.recording.steps.name
         title = "Step length and turning angle"
         return page_frame(

@@ -11,7 +11,8 @@ from driftwalk.core.errors import InputError
 from driftwalk.model.assembly import MOST_BLOCKS
 
 FILLED: Final = 0.4
-"""Share of the tank that blocks may cover; squares placed at random jam at about half."""
+"""Share of the tank that blocks may cover; squares placed at random jam at about half; chosen by
+hand."""
 
 Kind = Literal["range", "choice"]
 
@@ -96,6 +97,7 @@ class Knob:
 
 
 SPEED: Final = Knob("speed", "speed", "×", 0.25, 60.0, 0.01, log=True)
+"""The tank's time over the reader's: from slow motion to a minute in a second."""
 KNOBS: Final = (
     Knob("drag_coefficient", "drag coefficient C_d", "1", 0.0, 1.5, 0.01),
     Knob("force_std", "stochastic force σ_F", "N", 0.0, 1.5e-3, 1e-5),
@@ -109,6 +111,7 @@ KNOBS: Final = (
     Knob("magnets", "magnets", choices=("none", "3x3x1mm,1.2T", "5x5x2mm,1.2T")),
     SPEED,
 )
+"""Ranges hold the values of the paper with room to either side; chosen by hand."""
 
 
 def knobs_for(tank: LiveTank, *, most_blocks: int) -> dict[str, Knob]:

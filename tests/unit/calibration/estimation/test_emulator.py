@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from driftwalk.calibration.estimation.synthetic_likelihood import (
-    SHRUNK,
+    SYNTHETIC,
     LocalEmulator,
     fit_emulator,
 )
@@ -123,7 +123,9 @@ def test_the_misfit_at_the_truth_is_that_of_the_known_noise(
     truth = CENTRE + WIDTH * [0.3, -0.4]
     summaries = model.expected(truth[None]) + model.noise(sample)
     discrepancies = np.array([emulator.discrepancies(truth[None], one)[0] for one in summaries])
-    shrunk = (1 - SHRUNK) * model.covariance + SHRUNK * np.diag(np.diag(model.covariance))
+    shrunk = (1 - SYNTHETIC.shrunk) * model.covariance + SYNTHETIC.shrunk * np.diag(
+        np.diag(model.covariance)
+    )
     product = np.linalg.solve(shrunk, model.covariance)
     mean, variance = np.trace(product), 2 * np.trace(product @ product)
     if not related:
@@ -185,7 +187,7 @@ def test_misfits_are_squares_of_what_is_left_over_its_covariance():
     coefficients = np.linalg.inv(table.T @ table) @ table.T @ summaries
     left = summaries - table @ coefficients
     covariance = left.T @ left / (200 - 6)
-    covariance[~np.eye(SUMMARIES, dtype=bool)] *= 1 - SHRUNK
+    covariance[~np.eye(SUMMARIES, dtype=bool)] *= 1 - SYNTHETIC.shrunk
     recorded = summaries[0] + 1.0
     at = settings[:7]
     apart = terms((at - CENTRE) / WIDTH) @ coefficients - recorded

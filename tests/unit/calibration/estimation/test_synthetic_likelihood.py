@@ -7,8 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from driftwalk.calibration.estimation.synthetic_likelihood import (
-    SHRUNK,
-    SIMULATIONS,
+    SYNTHETIC,
     synthetic_likelihood_at,
 )
 
@@ -32,7 +31,7 @@ class Law:
 def test_every_simulation_is_of_the_setting() -> None:
     law = Law(1)
     found = synthetic_likelihood_at(law, np.zeros(4), SETTING, 30)
-    assert law.given.shape == (SIMULATIONS + 30, 2)
+    assert law.given.shape == (SYNTHETIC.simulations + 30, 2)
     assert (law.given == SETTING).all()
     assert found.own_discrepancies.shape == (30,)
 
@@ -56,7 +55,9 @@ def test_a_misfit_counts_standard_deviations() -> None:
 def test_the_variance_is_that_of_the_law() -> None:
     law = Law(4, correlation=0.9)
     # A part of the correlations is taken away.
-    wanted = np.log(np.linalg.det(np.diag(SPREAD**2))) + np.log1p(-((0.9 * (1 - SHRUNK)) ** 2))
+    wanted = np.log(np.linalg.det(np.diag(SPREAD**2))) + np.log1p(
+        -((0.9 * (1 - SYNTHETIC.shrunk)) ** 2)
+    )
     assert synthetic_likelihood_at(law, np.zeros(4), SETTING, 2).log_variance == pytest.approx(
         wanted, abs=0.4
     )

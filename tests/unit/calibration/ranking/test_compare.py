@@ -230,7 +230,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(regression_abc, "REGRESSION", wide)
     narrow = gauss_newton.GAUSS_NEWTON._replace(fewest_simulations=(128, 128), most_rounds=2)
     monkeypatch.setattr(gauss_newton, "GAUSS_NEWTON", narrow)
-    monkeypatch.setattr(synthetic_likelihood, "SIMULATIONS", 256)
+    fewer = synthetic_likelihood.SYNTHETIC._replace(simulations=256)
+    monkeypatch.setattr(synthetic_likelihood, "SYNTHETIC", fewer)
 
 
 def with_summaries(recorded: xr.Dataset, **options: Any) -> xr.Dataset:

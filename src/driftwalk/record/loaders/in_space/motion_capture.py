@@ -119,6 +119,7 @@ def _of_motive(titles: Rows, kind: str, name: str, settings: dict[str, str]) -> 
 _READ: Final = ("Objects", "Segments", "Trajectories")
 _OTHERS: Final = ("Devices", "Joints", "Model Outputs")
 _LINES: Final = 5
+"""Lines of a Vicon file before its data: section, rate, names, axes and units."""
 _POSITIONS: Final = (("TX", "TY", "TZ"), ("X", "Y", "Z"))
 _QUATERNION: Final = ("RX", "RY", "RZ", "RW")
 _PREFIX: Final = re.compile(r"^Global Angle\s+")

@@ -263,6 +263,7 @@ def _of_tidy(path: Path, options: ReadOptions) -> RawRecording:
 CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")
 """Points that TRex knows of an individual, the first that a file has is the body."""
 POSE: Final = tuple(f"pose{at}" for at in range(100))
+"""Points of the posture, as TRex numbers them; more than it writes."""
 ASSUMED: Final = (
     "the file does not hold cm_per_pixel, and TRex takes the image to be 30 cm wide where nobody "
     "set it: check the scale"

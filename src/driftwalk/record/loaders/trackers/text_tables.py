@@ -131,6 +131,7 @@ class DltdvLoader:
 
 
 SMARTICLES = ["sync", "t", *(f"{name}{at}" for at in (1, 2, 3) for name in ("x", "y", "theta"))]
+"""Columns of the robots' file, which has no header."""
 
 
 class SmarticlesLoader:

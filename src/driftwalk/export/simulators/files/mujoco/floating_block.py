@@ -25,6 +25,7 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 JOINTS = ("block_x", "block_y", "block_theta")
+# Words of the generator are unsigned numbers of 32 and 64 bits.
 MASK_32, MASK_64 = 0xFFFFFFFF, 0xFFFFFFFFFFFFFFFF
 
 
