@@ -205,7 +205,7 @@ template <class Real, class T, class Law>
 template <class Real, class T, class Law>
 inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>* members, Sums<Real>* sums,
                       int rows) {
-  if constexpr (Numbers<Real>::lanes > 1) {
+  if constexpr (moves_lanes<Real>) {
     if (has_faces_to_skip(physics, members, rows)) {
       feel_drag_of_open_faces(physics, members, sums, rows);
       return;
