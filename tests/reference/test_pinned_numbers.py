@@ -17,7 +17,7 @@ LONG = (
     *("model_calibration", "outcome_posterior", "yield", "calibration of two parameters"),
     *("fit of several flows",),
 )
-# Between linear algebra with and without AVX2 and FMA, and kernels with AVX2 and with the baseline's
+# Between linear algebra with and without AVX2 and FMA, and kernels with AVX2 and with baseline
 # instructions, the largest difference of another form was 2e-7, and of these 6e-6, 1e-4 and 4e-6.
 TOLERANCE = 1e-5
 WIDER = {
