@@ -121,6 +121,22 @@ class Answer(NamedTuple):
     warnings: list[str]
 
 
+class Following(NamedTuple):
+    """What comes after a run."""
+
+    command: tuple[str, ...] = ()
+    """The command that takes it further, its model, and a name for its result; none: a page."""
+    advice: str = ""
+    """What a page says: a sentence with a command, where ``{run}`` is the run directory."""
+
+
+PREDICT: Final = Following(
+    ("assemble", "assembly"),
+    "Predict what several such bodies build: `driftwalk assemble {run} -o four`",
+)
+"""After parameters of the block."""
+
+
 def number_text(value: float, digits: int = DIGITS) -> str:
     """Return a number with its significant digits, zeros included.
 
