@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from driftwalk.cli.options.run import RunOptions, with_run_options
+from driftwalk.cli.options.flatten_options import with_options
+from driftwalk.cli.options.run import RunOptions
 from driftwalk.cli.options.shared_types import PANEL, argument, option
 from driftwalk.core.errors import InputError
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@with_run_options
+@with_options(RunOptions, "out", "cluster", "cluster_options", "overwrite", "json")
 def kinetics(
     sources: Annotated[
         list[Path],
