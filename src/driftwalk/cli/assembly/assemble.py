@@ -70,6 +70,7 @@ def assemble(
     said = [*source.warnings, *([] if source.not_drawn is None else [source.not_drawn])]
     made = {**vars(options.run(work, "assemble", begun=begun, warnings=said))}
     answer = answer_of(made.pop("assembly"), **made)
+    assert answer is not None, "the kind declares one"
     print_prediction(answer, options.out, run, answer.warnings, json=options.json)
 
 

@@ -122,12 +122,12 @@ class Answer(NamedTuple):
 
 
 class Following(NamedTuple):
-    """What comes after a run."""
+    """The command that follows a run, and the advice that a page gives."""
 
     command: tuple[str, ...] = ()
     """The command that takes it further, its model, and a name for its result; none: a page."""
     advice: str = ""
-    """What a page says: a sentence with a command, where ``{run}`` is the run directory."""
+    """A sentence with a command, in which ``{run}`` is the run directory."""
 
 
 PREDICT: Final = Following(
