@@ -279,8 +279,8 @@ def assemble(
     Returns
     -------
     xarray.Dataset
-        An `assembly`, see `driftwalk.assembly.assemble`; `outcome_distribution` makes proportions
-        of it.
+        An `assembly`, see `driftwalk.assembly.assemble`, whose text begins with how often each
+        class formed; `outcome_distribution` makes proportions of it.
 
     Raises
     ------
