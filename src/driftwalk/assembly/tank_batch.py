@@ -167,8 +167,7 @@ class TankBatch:
         self._steps_per_interval = round(forces.force_interval_s / plan.study.time_step_s)
         self._due = 0.0
         rules = plan.study.assembly
-        comes_apart = rules.bond_rate_per_s > 0 or rules.bond_strength_N > 0
-        self._rests = complete == "rests" and rules.blocks > 1 and not comes_apart
+        self._rests = complete == "rests" and rules.blocks > 1 and not rules.bonds_break
         self._resting = np.zeros(count, dtype=bool)
         self._names: dict[bytes, str] = {}
         self._outcome = np.full(count, "", dtype=object)

@@ -110,7 +110,8 @@ class KsReference:
         method: Method = "fasano-franceschini",
     ) -> float:
         """Return the distance to another sample, as `ks_distance` does."""
-        return self._compare(other, ties, combine, method, counts_ties=False).distance
+        points = checked_points(other, "other")
+        return _compare(self.native, points, ties, combine, method, counts_ties=False).distance
 
     def compare(
         self,
@@ -121,24 +122,7 @@ class KsReference:
         method: Method = "fasano-franceschini",
     ) -> KsComparison:
         """Return the comparison with another sample, as `ks_compare` does."""
-        return self._compare(other, ties, combine, method)
-
-    def _compare(
-        self,
-        other: npt.ArrayLike,
-        ties: Ties,
-        combine: Combine,
-        method: Method,
-        *,
-        counts_ties: bool = True,
-    ) -> KsComparison:
-        points = checked_points(other, "other")
-        _check_options(ties, combine, method)
-        if method == "peacock":
-            return _peacock(self.native, points)
-        most = _most_tied(len(self) + len(points), ties, counts_ties)
-        found = self.native.compare(points, ties == "limits", most)
-        return _comparison(found, ties, combine, counts_ties)
+        return _compare(self.native, checked_points(other, "other"), ties, combine, method)
 
 
 def ks_reference(sample: npt.ArrayLike) -> KsReference:
@@ -213,7 +197,8 @@ def ks_distance(
     >>> ks_distance([[0, 0], [1, 1], [2, 2]], [[10, 10], [11, 11]])
     1.0
     """
-    return _compare_once(a, b, ties, combine, method, counts_ties=False).distance
+    first, second = checked_points(a, "a"), checked_points(b, "b")
+    return _compare(first, second, ties, combine, method, counts_ties=False).distance
 
 
 def ks_compare(
@@ -238,24 +223,29 @@ def ks_compare(
     >>> QUADRANTS[ks_compare([[0, 0], [1, 1]], [[5, 5], [6, 6]]).place.quadrant]
     'right above'
     """
-    return _compare_once(a, b, ties, combine, method)
+    return _compare(checked_points(a, "a"), checked_points(b, "b"), ties, combine, method)
 
 
-def _compare_once(
-    a: npt.ArrayLike,
-    b: npt.ArrayLike,
+def _compare(
+    first: _core.KsReference | Points,
+    second: Points,
     ties: Ties,
     combine: Combine,
     method: Method,
     *,
     counts_ties: bool = True,
 ) -> KsComparison:
-    first, second = checked_points(a, "a"), checked_points(b, "b")
+    """Return the comparison of two samples, the first of which may be sorted already."""
     _check_options(ties, combine, method)
     if method == "peacock":
-        return _peacock(_core.KsReference(first), second)
-    most = _most_tied(len(first) + len(second), ties, counts_ties)
-    found = _core.ks_compare(first, second, ties == "limits", most)
+        native = first if isinstance(first, _core.KsReference) else _core.KsReference(first)
+        return _peacock(native, second)
+    if isinstance(first, _core.KsReference):
+        most = _most_tied(first.size + len(second), ties, counts_ties)
+        found = first.compare(second, ties == "limits", most)
+    else:
+        most = _most_tied(len(first) + len(second), ties, counts_ties)
+        found = _core.ks_compare(first, second, ties == "limits", most)
     return _comparison(found, ties, combine, counts_ties)
 
 

@@ -12,7 +12,6 @@ from driftwalk.comparison.ks import KsComparison, Points, Ties, ks_compare, ks_d
 from driftwalk.comparison.plan import steps, usual_interval
 from driftwalk.comparison.significance import PermutationTest, block_permutation_test
 from driftwalk.comparison.statistic import joint_density, step_length_edges, turning_angle_edges
-from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.text_files import parse_json
 from driftwalk.schema import body_track
@@ -229,6 +228,8 @@ def compare_replicates(
     >>> dw.comparison.compare_replicates(recording, run)["ks_distance"].sizes["replicate"]
     3
     """
+    from scipy.spatial.distance import squareform
+
     count = simulation.sizes.get("replicate", 0)
     if count < 2:
         raise InputError(f"at least two replicates are needed, got {count}: simulate more")
@@ -238,7 +239,8 @@ def compare_replicates(
         interval = max(sampling_interval(recording, body), sampling_interval(replicates[0], None))
     motions = [step_points(recording, body, interval)]
     motions += [step_points(one, None, interval) for one in replicates]
-    distance = _pairwise(motions, ties)
+    pairs = itertools.combinations(motions, 2)
+    distance = squareform([ks_distance(*pair, ties=ties) for pair in pairs])
     mean = distance.sum(axis=1) / count
     among = distance[1:, 1:][np.triu_indices(count, k=1)]
     return build_dataset(
@@ -252,13 +254,3 @@ def compare_replicates(
         {"replicate": simulation["replicate"]},
         {"step_interval_s": interval, "ties": ties},
     )
-
-
-def _pairwise(motions: list[Floats], ties: Ties) -> Floats:
-    """Return the KS distances of every two motions, shape (motions, motions), 0 with itself."""
-    found = np.zeros((len(motions), len(motions)))
-    for first, second in itertools.combinations(range(len(motions)), 2):
-        found[first, second] = found[second, first] = ks_distance(
-            motions[first], motions[second], ties=ties
-        )
-    return found

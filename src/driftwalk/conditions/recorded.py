@@ -355,8 +355,6 @@ def simulate_like(
     >>> run.sizes["time"]
     100
     """
-    from driftwalk.schema import body_track
-
     track = body_track(recording, body)
     study = study_as_seen(study, recording, track)
     begin = recorded_start(track)

@@ -38,6 +38,10 @@ class Samples:
     acceleration: Floats
     """Acceleration [m/s²], shape (n, 2)."""
 
+    def select(self, chosen: Bools) -> Samples:
+        """Return some of the samples."""
+        return Samples(*(column[chosen] for column in vars(self).values()))
+
 
 @dataclass(frozen=True)
 class CellMeans:

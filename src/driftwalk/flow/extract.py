@@ -236,15 +236,8 @@ def _smooth(trajectory: xr.Dataset, bodies: list[str], window: float, grid: Grid
 
 def _inside(smoothed: _Smoothed, outline: Outline) -> Samples:
     """Return the samples that lie in the tank."""
-    samples = smoothed.samples
-    kept = (samples.cell >= 0) & (outline.depth(*smoothed.position.T) >= 0.0)
-    return Samples(
-        samples.cell[kept],
-        samples.body[kept],
-        samples.time[kept],
-        samples.velocity[kept],
-        samples.acceleration[kept],
-    )
+    kept = (smoothed.samples.cell >= 0) & (outline.depth(*smoothed.position.T) >= 0.0)
+    return smoothed.samples.select(kept)
 
 
 def _nothing_measured(smoothed: _Smoothed, inside: Samples, min_count: int, window: float) -> str:

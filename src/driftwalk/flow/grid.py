@@ -7,6 +7,7 @@ is stirred alike.
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,13 +16,8 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats, Indices
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.schema import check_flow_field
-
-if TYPE_CHECKING:
-    import xarray as xr
-import math
-
 from driftwalk.flow.arena import Outline
+from driftwalk.schema import check_flow_field
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.flow.analytic import TANK_30_CM, flow_from_function
+from driftwalk.flow.analytic import TANK_30_CM, Velocity, flow_from_function
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import make_grid
 from driftwalk.schema.trajectory import read_arena
@@ -19,7 +19,6 @@ from driftwalk.schema.trajectory import read_arena
 if TYPE_CHECKING:
     import xarray as xr
 
-Velocity = Callable[[Floats, Floats], tuple[Floats, Floats]]
 Family = Literal["swirl", "eddies"]
 
 

@@ -46,14 +46,7 @@ class Steps:
 
     def select(self, chosen: Bools) -> Steps:
         """Return some of the steps."""
-        return Steps(
-            self.body[chosen],
-            self.first[chosen],
-            self.time[chosen],
-            self.interval[chosen],
-            self.position[chosen],
-            self.velocity[chosen],
-        )
+        return Steps(*(column[chosen] for column in vars(self).values()))
 
     @property
     def goes_on(self) -> Bools:
@@ -195,24 +188,10 @@ _CHUNK: Final = 1 << 14
 """Steps whose neighbours are looked up at once: some 40 MB; chosen by hand."""
 
 
-class Judged(NamedTuple):
-    """The verdict of the test on every step."""
+def judge_steps(steps: Steps, *, noise: float) -> Floats:
+    """Return how far every step deviates from its neighbours, and from the steps around it.
 
-    deviation: Floats
-    """Normalised deviation, shape (n,); NaN where a step is not judged."""
-
-    def is_false(self, threshold: float) -> Bools:
-        """Return which steps are false links."""
-        return np.asarray(self.deviation > threshold)
-
-    @property
-    def unjudged(self) -> int:
-        """Steps with too few neighbours."""
-        return int(np.count_nonzero(np.isnan(self.deviation)))
-
-
-def judge_steps(steps: Steps, *, noise: float) -> Judged:
-    """Compare every step with its neighbours, and with the steps before and after it.
+    A step with too few neighbours is not judged: NaN. One above a threshold is a false link.
 
     The normalised median test (Westerweel and Scarano, Exp. Fluids 39 (2005) 1096), on the
     nearest steps of other tracks, at any time: with the median m of their velocities, by component,
@@ -237,7 +216,7 @@ def judge_steps(steps: Steps, *, noise: float) -> Judged:
     >>> x = np.arange(5.0)[:, None] + np.linspace(0.0, 1.0, 20)
     >>> x[3:, 7] += 9.0
     >>> steps = track_steps(build_trajectory(np.arange(5.0), x, 0.0 * x)).steps
-    >>> np.flatnonzero(judge_steps(steps, noise=0.01).is_false(LINKS.threshold)).tolist()
+    >>> np.flatnonzero(judge_steps(steps, noise=0.01) > LINKS.threshold).tolist()
     [30]
     """
     middle, spread = _neighbourhood(steps)
@@ -247,7 +226,7 @@ def judge_steps(steps: Steps, *, noise: float) -> Judged:
         deviation = apart / (spread + own_noise)
     # Neighbours that all agree, and a step that agrees with them.
     deviation[(apart == 0.0) & np.isfinite(spread)] = 0.0
-    return Judged(deviation)
+    return np.asarray(deviation)
 
 
 def _from_own(steps: Steps) -> Floats:
@@ -399,8 +378,8 @@ def flow_from_tracers(
     noise = _noise(trajectory, steps) if position_noise is None else position_noise
     # Beyond the wall there is no flow to agree with: such steps would count as neighbours of true
     # ones.
-    judged = judge_steps(inside, noise=noise)
-    false = judged.is_false(outlier_threshold)
+    deviation = judge_steps(inside, noise=noise)
+    false = deviation > outlier_threshold
     kept = inside.select(~false)
     means = _average(kept, grid)
     measured = means.count.reshape(grid.shape) >= min_count
@@ -418,7 +397,7 @@ def flow_from_tracers(
         "tracks_used": int(np.unique(kept.body).size),
         "samples_used": int(kept.time.size),
         "samples_rejected": int(np.count_nonzero(false)),
-        "samples_unjudged": judged.unjudged,
+        "samples_unjudged": int(np.count_nonzero(np.isnan(deviation))),
         "samples_across_gaps": found.across_gaps,
         "samples_ambiguous": found.ambiguous,
         "samples_outside_tank": int(steps.time.size - inside.time.size),

@@ -43,7 +43,7 @@ from driftwalk.likelihood.filter.series import FILTER, Series
 from driftwalk.likelihood.law.candidate_laws import INTENSITIES
 from driftwalk.likelihood.newton import Mode, ModeSearch, known_numbers_variance
 from driftwalk.likelihood.refuse import cholesky
-from driftwalk.likelihood.spline import Spline, basis_matrix
+from driftwalk.likelihood.spline import Spline
 
 
 class RemlPolicy(NamedTuple):
@@ -340,6 +340,5 @@ def remembered(rows: Floats, turns: Floats, lost: Bools, memory: Floats) -> tupl
 
 def _bases(spline: Spline, x: Floats, y: Floats) -> Floats:
     """Return all basis functions at places, shape (n, coefficients of one component)."""
-    along_x = basis_matrix((x - spline.origin_x) / spline.spacing, spline.columns)
-    along_y = basis_matrix((y - spline.origin_y) / spline.spacing, spline.rows)
+    along_x, along_y = spline.design(x, y)
     return (along_y[:, :, None] * along_x[:, None, :]).reshape(x.size, -1)

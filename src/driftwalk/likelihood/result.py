@@ -11,15 +11,14 @@ has.
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Floats
-from driftwalk.flow.arena import Outline, outline_of
+from driftwalk.flow.arena import outline_of
+from driftwalk.flow.cell_means import flags_of
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
@@ -128,7 +127,7 @@ def build_fit(
                 "u_standard_error": (plane, errors[0]),
                 "v_standard_error": (plane, errors[1]),
                 "count": (plane, count),
-                "flag": (plane, _flags(grid, outline, count)),
+                "flag": (plane, flags_of(grid, outline, count >= 3)),
                 "coefficient": (knots, coefficients),
             }
         )
@@ -184,7 +183,7 @@ def build_fit(
     attrs: dict[str, Any] = {
         "kind": "fit",
         "schema_version": KINDS["fit"].version,
-        "arena": json.dumps(study.tank.to_arena()),
+        "arena": study.tank.to_arena_json(),
         **{name: facts[name] for name in WORDS},
         **{name: facts[name] for name in REASONS if name in facts},
         "study": study.to_toml(),
@@ -283,11 +282,3 @@ def footprint_count(grid: Grid, series: list[Series], *, side: float, oriented: 
                     inside &= np.hypot(away_x, away_y) <= half
                 total += np.bincount((j * grid.x.size + i)[inside], minlength=grid.size)
     return total.reshape(grid.shape)
-
-
-def _flags(grid: Grid, outline: Outline, count: Floats) -> npt.NDArray[np.int8]:
-    x, y = (part.ravel() for part in grid.nodes())
-    flag = np.full(grid.shape, FLAGS["filled"], dtype=np.int8)
-    flag[(outline.depth(x, y) < 0.0).reshape(grid.shape)] = FLAGS["outside"]
-    flag[count >= 3] = FLAGS["measured"]
-    return flag

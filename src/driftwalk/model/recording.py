@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -73,6 +73,18 @@ class Columns(Section):
     def to_dict(self) -> dict[str, str]:
         """Return the columns that are set, from quantity to column."""
         return self.model_dump(exclude_none=True)
+
+
+_ARGUMENTS: Final = {
+    "start_s": "start",
+    "stop_s": "stop",
+    "frame_rate_Hz": "frame_rate",
+    "max_speed_m_s": "max_speed",
+    "x_file": "x",
+    "y_file": "y",
+    "theta_file": "theta",
+}
+"""Arguments of `driftwalk.record.load` that have another name than their key."""
 
 
 class Recording(Section):
@@ -157,33 +169,12 @@ class Recording(Section):
 
         Options that are not set are left out, so that the loader's own default applies.
         """
-        named = {
-            "format": self.format if self.format != "auto" else None,
-            "body": self.body,
-            "start": self.start_s,
-            "stop": self.stop_s,
-            "frame_rate": self.frame_rate_Hz,
-            "metres_per_pixel": self.metres_per_pixel,
-            "length_unit": self.length_unit if self.length_unit != "auto" else None,
-            "y_axis": self.y_axis if self.y_axis != "auto" else None,
-            "max_speed": self.max_speed_m_s,
-            "sort": self.sort,
-            "columns": self.columns.to_dict() if self.columns is not None else None,
-            "delimiter": self.delimiter,
-            "up": self.up if self.up != "auto" else None,
-            "topic": self.topic,
-            "header_line": self.header_line,
-            "sheet": self.sheet,
-            "x": self.x_file,
-            "y": self.y_file,
-            "theta": self.theta_file,
-            "keypoint": self.keypoint,
-            "heading": self.heading,
-            "min_confidence": self.min_confidence,
-            "box": self.box if self.box != "auto" else None,
-            "missing": self.missing,
+        stated = self.model_dump(exclude_none=True, exclude={"arena", "arena_center_m"})
+        return {
+            _ARGUMENTS.get(key, key): value
+            for key, value in stated.items()
+            if not (value == "auto" and self.is_default(key))
         }
-        return {name: value for name, value in named.items() if value is not None}
 
     @model_validator(mode="after")
     def _some_time(self) -> Self:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from driftwalk import _core
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.arrays import Floats, Keys
@@ -76,15 +74,10 @@ class BlockModel(NativeModel):
         return native_model(self.study, like.flow, like.sample_time, like.camera), None
 
     def _worlds(self, values: Values, like: Conditions, keys: Keys) -> tuple[Floats, None]:
-        start = like.start
+        start = like.start._replace(theta=world_orientations(like.start.theta, keys))
         table = world_table(
-            x=start.x,
-            y=start.y,
-            theta=world_orientations(start.theta, keys),
-            vx=start.vx,
-            vy=start.vy,
-            omega=start.omega,
-            drag_coefficient=np.asarray(values["drag_coefficient"], dtype=np.float64),
-            force_std=np.asarray(values["force_std"], dtype=np.float64),
+            **start._asdict(),
+            drag_coefficient=values["drag_coefficient"],
+            force_std=values["force_std"],
         )
         return table, None

@@ -21,10 +21,14 @@ from driftwalk.motion.family.particle import time_step_of
 from driftwalk.motion.protocol import MotionModel, Worlds, no_numbers
 from driftwalk.motion.values import known_values
 from driftwalk.schema import body_track
-from driftwalk.schema.check import build_dataset
 from driftwalk.simulation.backend import STATUS, check_sample_time
 from driftwalk.simulation.initial import Start, random_place, random_start
-from driftwalk.simulation.run import default_times, plain_camera, replicate_keys
+from driftwalk.simulation.run import (
+    default_times,
+    plain_camera,
+    replicate_keys,
+    simulation_dataset,
+)
 from driftwalk.simulation.series import continued_flow, flow_starts, series_facts, velocity_at
 
 if TYPE_CHECKING:
@@ -241,38 +245,20 @@ def _dataset(
     worlds: Worlds,
     seed: int,
 ) -> xr.Dataset:
-    dims = ("replicate", "time", "body")
-    data: dict[str, Any] = {
-        name: (dims, np.asarray(getattr(worlds, name))[:, :, None]) for name in ("x", "y", "theta")
-    }
-    data["status"] = ("replicate", worlds.status.astype(np.int32))
-    if conditions.flow_start is not None:
-        data["flow_start"] = ("replicate", conditions.flow_start)
+    times, starts = conditions.sample_time, conditions.flow_start
     stated = {one.key: values[one.name] for one in model.parameters}
     attrs: dict[str, Any] = {"model": model.name, **model.facts(values)}
     if isinstance(model, ParticleModel):
         # Numbers that the caller fixed are no parameters of the model, and a repeated run needs
         # them.
         stated |= model.known
-        attrs["time_step_s"] = time_step_of(conditions.sample_time)
-    return build_dataset(
-        "simulation",
-        data,
-        {
-            "time": ("time", conditions.sample_time),
-            "body": ("body", np.array(["body"], dtype=object)),
-            "replicate": ("replicate", np.arange(worlds.status.size)),
-        },
-        {
-            "arena": study.tank.to_arena_json(),
-            **attrs,
-            "model_parameters": json.dumps(stated),
-            "seed": seed,
-            "study": study.to_toml(),
-            **series_facts(
-                conditions.flow,
-                conditions.flow_start,
-                duration=float(conditions.sample_time[-1]),
-            ),
-        },
-    )
+        attrs["time_step_s"] = time_step_of(times)
+    attrs = {
+        "arena": study.tank.to_arena_json(),
+        **attrs,
+        "model_parameters": json.dumps(stated),
+        "seed": seed,
+        "study": study.to_toml(),
+        **series_facts(conditions.flow, starts, duration=float(times[-1])),
+    }
+    return simulation_dataset("body", times, worlds[:3], worlds.status, starts, attrs)

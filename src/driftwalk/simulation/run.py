@@ -101,7 +101,7 @@ def simulate(
         starts = np.full(count, float(flow_start))
     model = native_model(study, water, times, plain_camera(study))
     worlds = world_table(
-        **{**begin._asdict(), "theta": world_orientations(begin.theta, keys)},
+        **begin._replace(theta=world_orientations(begin.theta, keys))._asdict(),
         drag_coefficient=np.full(count, study.forces.drag_coefficient),
         force_std=study.forces.force_std_N,
     )
@@ -122,9 +122,20 @@ def simulate(
             "(`simulation.replicates`, `simulation.sample_rate_Hz`) or a shorter time "
             "(`simulation.duration_s`)"
         ) from error
-    facts = series_facts(water, starts, duration=float(times[-1]))
-    attrs = {"seed": chosen, "backend": backend, **facts}
-    return _dataset(study, times, (x, y, theta), status, starts, attrs)
+    forces = study.forces
+    attrs = {
+        "arena": study.tank.to_arena_json(),
+        "drag_coefficient": forces.drag_coefficient,
+        "force_std_N": forces.force_std_N,
+        "force_interval_s": forces.force_interval_s,
+        "force_noise_intensity_N2_s": forces.force_noise_intensity_N2_s,
+        "time_step_s": study.time_step_s,
+        "study": study.to_toml(),
+        "seed": chosen,
+        "backend": backend,
+        **series_facts(water, starts, duration=float(times[-1])),
+    }
+    return simulation_dataset("block", times, (x, y, theta), status, starts, attrs)
 
 
 def plain_camera(study: Study) -> Camera:
@@ -159,38 +170,26 @@ def _study_start(study: Study, keys: npt.NDArray[np.uint64]) -> Start:
     return random_start(study, keys)
 
 
-def _dataset(
-    study: Study,
+def simulation_dataset(
+    body: str,
     times: Any,
     poses: tuple[Any, Any, Any],
     status: Any,
     starts: Any,
     attrs: dict[str, Any],
 ) -> xr.Dataset:
+    """Return poses of shape (replicates, times) as a dataset of the kind "simulation"."""
     dims = ("replicate", "time", "body")
-    forces = study.forces
     data: dict[str, Any] = {
-        name: (dims, values[:, :, None]) for name, values in zip(POSE, poses, strict=True)
+        name: (dims, np.asarray(values)[:, :, None])
+        for name, values in zip(POSE, poses, strict=True)
     }
     data["status"] = ("replicate", status.astype(np.int32))
     if starts is not None:
         data["flow_start"] = ("replicate", starts)
-    return build_dataset(
-        "simulation",
-        data,
-        {
-            "time": ("time", times),
-            "body": ("body", np.array(["block"], dtype=object)),
-            "replicate": ("replicate", np.arange(status.size)),
-        },
-        {
-            "arena": study.tank.to_arena_json(),
-            "drag_coefficient": forces.drag_coefficient,
-            "force_std_N": forces.force_std_N,
-            "force_interval_s": forces.force_interval_s,
-            "force_noise_intensity_N2_s": forces.force_noise_intensity_N2_s,
-            "time_step_s": study.time_step_s,
-            "study": study.to_toml(),
-            **attrs,
-        },
-    )
+    coords = {
+        "time": ("time", times),
+        "body": ("body", np.array([body], dtype=object)),
+        "replicate": ("replicate", np.arange(status.size)),
+    }
+    return build_dataset("simulation", data, coords, attrs)

@@ -10,6 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, as_completed, wait
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple, Protocol
 
@@ -18,7 +19,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays, Unit, UnitT
-from driftwalk.core.progress import Progress
+from driftwalk.core.progress import Progress, tell_nobody
 from driftwalk.sweep.design import WorkUnit
 from driftwalk.sweep.workers import HANDOUT, Handout, UnitFunction, UnitFuture, handout, is_lost
 
@@ -188,6 +189,41 @@ def run_sweep(
     else:
         _Elsewhere(handout(executor, function), missing, kept, tally).run()
     return collect(kept, units)
+
+
+@dataclass
+class SweepSeries:
+    """Sweeps one after the other, each with a store of its own and all with one progress.
+
+    Attributes
+    ----------
+    total : int
+        Settings of all sweeps.
+    store : callable or None
+        Returns the store of a sweep by its name.
+    executor, progress
+        As for `run_sweep`.
+    done : int
+        Settings of the sweeps so far.
+    """
+
+    total: int
+    store: Callable[[str], Store | None] | None
+    executor: Executor | None
+    progress: Progress | None
+    done: int = 0
+
+    def run(self, name: str, function: UnitFunction, units: Sequence[WorkUnit]) -> Arrays:
+        """Return the results of the next sweep."""
+        before = self.done
+        self.done += sum(unit.size for unit in units)
+        return run_sweep(
+            function,
+            units,
+            store=None if self.store is None else self.store(name),
+            executor=self.executor,
+            progress=lambda done, _: (self.progress or tell_nobody)(before + done, self.total),
+        )
 
 
 class _Tally:

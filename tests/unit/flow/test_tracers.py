@@ -62,7 +62,7 @@ def test_false_links_are_left_out_and_right_ones_kept(fresh_seed: Callable[[int]
     noise = step_noise(steps)
     # The noise that was put in; its median is good to some percent.
     assert noise == pytest.approx(1e-4, rel=0.15)
-    found = judge_steps(steps, noise=noise).is_false(LINKS.threshold)
+    found = judge_steps(steps, noise=noise) > LINKS.threshold
     false = seeded.false.T.ravel()
     assert found[false].mean() > 0.85
     assert found[~false].mean() < 2e-3
@@ -86,7 +86,7 @@ def test_scatter_alone_loses_two_steps_in_a_thousand(fresh_seed: Callable[[int],
     number = np.arange(n)
     steps = Steps(number, 2 * number, 0.0 * number, 1.0 + 0.0 * number, at, velocity)
     # 0.17 %: 34 of 20,000, give or take 6.
-    assert 12 <= np.count_nonzero(judge_steps(steps, noise=0.0).is_false(LINKS.threshold)) <= 60
+    assert 12 <= np.count_nonzero(judge_steps(steps, noise=0.0) > LINKS.threshold) <= 60
 
 
 def test_the_neighbours_of_a_step_are_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,16 +24,15 @@ from driftwalk.assembly.chains.hidden import (
 from driftwalk.assembly.chains.histories import Histories, blocks_of, datasets_of, histories
 from driftwalk.assembly.chains.mixing import WELL_MIXED, equal_rates, judge_mixing, needed_events
 from driftwalk.assembly.outcomes.bond_kinetics import PARTS, clustering, rate_interval
-from driftwalk.assembly.outcomes.distribution import with_limits
+from driftwalk.assembly.outcomes.distribution import is_complete, with_limits
 from driftwalk.assembly.outcomes.outcome_classes import sort_classes
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.core.progress import tell_nobody
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
-from driftwalk.schema.shapes import is_one_assembly
-from driftwalk.sweep import Design, WorkUnit, grid, run_sweep
+from driftwalk.sweep import WorkUnit, grid
+from driftwalk.sweep.run import SweepSeries
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -140,21 +139,9 @@ def kinetics(
     found = sets[0]
     mixing = judge_mixing(found)
     folds, replicates = KINETICS_POLICY.folds, KINETICS_POLICY.replicates
-    whole = len(FORMS) * folds + replicates
-
-    def swept(
-        name: str, function: Callable[[WorkUnit], Arrays], design: Design, begun: int
-    ) -> Arrays:
-        return run_sweep(
-            function,
-            design.units(1),
-            store=None if store is None else store(name),
-            executor=executor,
-            progress=lambda done, _: (progress or tell_nobody)(begun + done, whole),
-        )
-
+    sweeps = SweepSeries(len(FORMS) * folds + replicates, store, executor, progress)
     models = grid(model=np.arange(len(FORMS)), fold=np.arange(folds))
-    scored = swept("held_out", partial(_held_out, found), models, 0)
+    scored = sweeps.run("held_out", partial(_held_out, found), models.units(1))
     scores = np.nansum(scored["score"].reshape(len(FORMS), folds, -1), axis=1)
     best = int(scores.mean(axis=1).argmax())
     behind = scores - scores[best]
@@ -165,8 +152,7 @@ def kinetics(
     model = fit(found, FORMS[chosen])
     pairs = np.argwhere(np.sum([counts_and_times(one)[0] for one in sets], axis=0) > 0)
     again = Replicate(found, model, pairs, own_target, seed)
-    drawn = grid(replicate=np.arange(replicates))
-    bands = swept("bootstrap", again, drawn, whole - replicates)
+    bands = sweeps.run("bootstrap", again, grid(replicate=np.arange(replicates)).units(1))
     data, coords, attrs = _rates(sets, pairs, seed)
     statistics = np.array([(one.statistic, one.low, one.high) for one in mixing.tests])
     statistics = statistics.reshape(-1, 3).T
@@ -449,7 +435,7 @@ def empirical_shares(found: Histories, time: Floats) -> Floats:
 
 def completion(found: Histories, model: Model) -> dict[str, Any]:
     """Return the KS distance of the completion times and its 95 % floor, where runs complete."""
-    whole = np.array([is_one_assembly(name) for name in found.classes])
+    whole = is_complete(found.classes)
     complete = whole[found.state]
     # Where blocks part, a run is complete several times: the first counts.
     happened = np.sort(found.entry[complete][np.unique(found.run[complete], return_index=True)[1]])

@@ -37,7 +37,8 @@ from driftwalk.core.files.shards import Arrays
 from driftwalk.core.intervals import proportion_interval
 from driftwalk.schema.check import build_dataset, require_kind
 from driftwalk.schema.shapes import all_single
-from driftwalk.sweep import Store, grid, run_sweep
+from driftwalk.sweep import Store, grid
+from driftwalk.sweep.run import SweepSeries
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -296,9 +297,7 @@ def plan_control(
     classes = outcome_classes(modes.study.assembly.blocks)
     planner = _Planner(
         modes, wanted, classes, worlds, seed,
-        (lambda _: None) if store is None else store, executor,
-        (lambda *_: None) if progress is None else progress,
-        worlds * (rounds + 6),
+        SweepSeries(worlds * (rounds + 6), store, executor, progress),
     )  # fmt: skip
     return planner.plan(rounds)
 
@@ -310,11 +309,7 @@ class _Planner:
     classes: tuple[str, ...]
     worlds: int
     seed: int
-    store: Callable[[str], Store | None]
-    executor: Executor | None
-    progress: Callable[[int, int], None]
-    total: int
-    done: int = 0
+    sweeps: SweepSeries
     used: int = 0
     """Worlds so far: the number of the next new one."""
     safe: int = 0
@@ -387,18 +382,12 @@ class _Planner:
         count = self.worlds if worlds is None else worlds
         begin = self.used if first is None else first
         self.used = max(self.used, begin + count)
-        before, self.done = self.done, self.done + count
         rules = Rules(tables.astype(np.int16), self.safe, self.wanted.dwell)
         work = Worlds(
             self.modes, self.classes, self.wanted, rules, self.seed, begin, **how
         )  # fmt: skip
-        return run_sweep(
-            work,
-            grid(world=np.arange(begin, begin + count)).units(CONTROL_POLICY.unit),
-            store=self.store(name),
-            executor=self.executor,
-            progress=lambda done, _: self.progress(before + done, self.total),
-        )
+        units = grid(world=np.arange(begin, begin + count)).units(CONTROL_POLICY.unit)
+        return self.sweeps.run(name, work, units)
 
     def dataset(
         self, action: Integers, constant: Floats, each: int, promised: Floats, reached: Floats,

@@ -16,7 +16,7 @@ from driftwalk.assembly.control.plan import (
     stored_wanted,
 )
 from driftwalk.assembly.control.worlds import Wanted, Worlds
-from driftwalk.assembly.outcomes.distribution import with_limits
+from driftwalk.assembly.outcomes.distribution import is_complete, with_limits
 from driftwalk.assembly.runs.dataset import build_path
 from driftwalk.assembly.runs.plan import make_plan
 from driftwalk.assembly.tank_batch import TankBatch
@@ -24,10 +24,9 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.intervals import difference_interval, proportion_interval
-from driftwalk.core.progress import tell_nobody
 from driftwalk.schema.check import build_dataset
-from driftwalk.schema.shapes import is_one_assembly
-from driftwalk.sweep import Store, grid, run_sweep
+from driftwalk.sweep import Store, grid
+from driftwalk.sweep.run import SweepSeries
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,20 +95,14 @@ def try_control(
     # Behind all worlds of the plan; the best constant mode is chosen in the worlds after them.
     first = int(policy.attrs["worlds_used"])
     best = np.argsort(-policy["constant_reached"].values, kind="stable")[:CONSTANTS].tolist()
-    total, done = worlds * (3 + len(best)), 0
+    sweeps = SweepSeries(worlds * (3 + len(best)), store, executor, progress)
 
     def ran(name: str, arm: Any, only: int | None = None, begin: int = first) -> Arrays:
-        nonlocal done
-        before, done = done, done + worlds
-        return run_sweep(
-            Worlds(
-                modes, classes, wanted, rules, seed, arm=arm, only=only, force_factor=force_factor
-            ),
-            grid(world=np.arange(begin, begin + worlds)).units(CONTROL_POLICY.unit),
-            store=None if store is None else store(name),
-            executor=executor,
-            progress=lambda at, _: (progress or tell_nobody)(before + at, total),
+        work = Worlds(
+            modes, classes, wanted, rules, seed, arm=arm, only=only, force_factor=force_factor
         )
+        units = grid(world=np.arange(begin, begin + worlds)).units(CONTROL_POLICY.unit)
+        return sweeps.run(name, work, units)
 
     policys = ran("policy", "policy")
     alone = [
@@ -126,7 +119,7 @@ def try_control(
     apart = reached[0] - reached
     gain = apart.mean(axis=1)
     half = norm.ppf(0.5 + 0.5 * share) * (apart.std(axis=1, ddof=1) / np.sqrt(worlds))
-    whole = np.array([is_one_assembly(name) for name in classes])
+    whole = is_complete(classes)
     example = _example(policys, target)
     stated, planned = float(policy.attrs["reached"]), int(policy.attrs["worlds"])
     counts = [reached[0].sum(), round(stated * planned)]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from driftwalk.assembly.chains.histories import Histories, blocks_of, histories
+from driftwalk.assembly.outcomes.distribution import is_complete
 from driftwalk.assembly.outcomes.outcome_classes import class_name, class_shapes, merge_chirality
 from driftwalk.assembly.runs.dataset import DECIMALS
 from driftwalk.core.arrays import Floats, Integers
@@ -290,7 +291,7 @@ def _known_until(found: Histories, *, breaks: bool) -> tuple[Floats, Floats]:
     """Return the lengths of the runs [s], and until when their classes are known, inf: for good."""
     length: Floats = np.round(np.bincount(found.run, found.duration), DECIMALS)
     parts = np.array([len(class_shapes(name)) for name in found.classes])
-    whole = np.array([is_one_assembly(name) for name in found.classes])
+    whole = is_complete(found.classes)
     known, ends = length.copy(), found.target < 0
     parted = parts[found.target[~ends]] > parts[found.state[~ends]]
     if not (breaks or parted.any()):

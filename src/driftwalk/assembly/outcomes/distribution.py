@@ -5,7 +5,7 @@ A class is named by its polyominoes joined by "+", so a class without "+" is one
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -220,7 +220,7 @@ def at_times(
     return np.take_along_axis(whole, happened, axis=1)
 
 
-def is_complete(names: list[str]) -> Bools:
+def is_complete(names: Sequence[str]) -> Bools:
     """Return which classes are one single assembly."""
     return np.array([is_one_assembly(name) for name in names], dtype=bool)
 

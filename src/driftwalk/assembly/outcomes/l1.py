@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -104,15 +105,13 @@ def pairwise_l1(distributions: Sequence[Distribution]) -> PairwiseL1:
     >>> pairwise_l1([[0.5, 0.5], [0.25, 0.75], [0.5, 0.5]]).distance[0].tolist()
     [0.0, 0.5, 0.0]
     """
+    from scipy.spatial.distance import squareform
+
     number = len(distributions)
     if number < 2:
         raise InputError(f"distances between pairs need at least two distributions, got {number}")
-    distance = np.zeros((number, number))
-    for i in range(number):
-        for j in range(i):
-            distance[i, j] = distance[j, i] = l1_distance(distributions[i], distributions[j])
-    pairs = distance[np.triu_indices(number, 1)]
-    return PairwiseL1(float(pairs.mean()), float(pairs.max()), distance)
+    pairs = np.array([l1_distance(b, a) for a, b in combinations(distributions, 2)])
+    return PairwiseL1(float(pairs.mean()), float(pairs.max()), squareform(pairs))
 
 
 def l1_noise_floor(

@@ -273,7 +273,7 @@ def map_dataset(
     with np.errstate(invalid="ignore"):
         share = count / runs[:, None]
         # Whole numbers first: shares that are rounded one by one do not add up to 1.
-        complete = count[:, is_complete(list(names))].sum(axis=1) / runs
+        complete = count[:, is_complete(names)].sum(axis=1) / runs
     known = reference.reindex({"class": list(names)}, fill_value=0.0)["proportion"].values
     blocks = np.array([world.study.assembly.blocks for world in settings.worlds])[settings.world]
     reference_runs = int(reference.attrs["runs"])

@@ -27,6 +27,8 @@ from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays, Unit, UnitT
 from driftwalk.core.progress import Progress
+from driftwalk.core.study_keys import ASSEMBLY_KEYS
+from driftwalk.model.sensitivity import AXES
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.simulation.series import flow_starts
 from driftwalk.sweep import (
@@ -364,21 +366,7 @@ class TextStore:
         }
 
 
-KEYS: Final[dict[str, str]] = {
-    "tank_diameter": "tank.diameter_m",
-    "blocks": "assembly.blocks",
-    "flow": "",
-    "flow_scale": "",
-    "glued": "assembly.glued",
-    "latching": "assembly.latching",
-    "faces": "assembly.faces",
-    "hidden_face_drag": "assembly.hidden_face_drag",
-    "stirring_length": "forces.stirring_length_m",
-    "bond_rate": "assembly.bond_rate_per_s",
-    "magnets": "interaction.magnets",
-    "drag_coefficient": "forces.drag_coefficient",
-    "force_std": "forces.force_std_N",
-}
+KEYS: Final = {name: ASSEMBLY_KEYS.get(name, "") for name in AXES}
 """From the name of an axis to the parameter of the study that it varies."""
 OF_EACH_RUN: Final = ("drag_coefficient", "force_std")
 """The axes along which runs can be simulated side by side."""

@@ -449,7 +449,7 @@ def _indices(study: Study, design: xr.Dataset, outcomes: Outcomes) -> xr.Dataset
             "smaller time step"
         )
     share = count / runs[:, None]
-    complete = share[:, is_complete(list(names))].sum(axis=1)
+    complete = share[:, is_complete(names)].sum(axis=1)
     # Sums of shares may exceed one by a hair.
     table = np.minimum(np.column_stack([complete, share]), 1.0)
     outputs = xr.DataArray(

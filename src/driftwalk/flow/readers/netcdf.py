@@ -179,8 +179,6 @@ def _planar(named: xr.Dataset) -> xr.Dataset:
     chosen = named[["u", "v"]]
     if "mask" in named:
         chosen = chosen.where(named["mask"] == 0)
-        for name in ("u", "v"):
-            chosen[name].attrs = named[name].attrs
     extra = [name for name in chosen.dims if name not in ("time", "y", "x")]
     long = [name for name in extra if chosen.sizes[name] > 1]
     if long or not {"x", "y"} <= set(chosen["u"].dims) & set(chosen["v"].dims):
@@ -203,12 +201,7 @@ def _with_times(chosen: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
     if count == 1:
         return chosen.isel(time=0, drop=True), []
     if unit in _COUNTED:
-        attrs = {name: chosen[name].attrs for name in ("u", "v")}
-        mean = chosen.mean("time", skipna=True)
-        for name in ("u", "v"):
-            mean[name].attrs = attrs[name]
-        for axis in ("x", "y"):
-            mean[axis].attrs = chosen[axis].attrs
+        mean = chosen.mean("time", skipna=True, keep_attrs=True)
         return mean, [f"the flow is the mean of {count} frames: the file holds no times"]
     try:
         # "seconds since ..." counts from a date that nothing here needs.

@@ -114,8 +114,11 @@ def compare_motion(
     real: Floats, at_estimate: EstimateDistances, drawn: Replicates, *, threads: int
 ) -> MotionComparison:
     """Compare a recording's steps with simulated ones."""
+    from scipy.spatial.distance import squareform
+
     _require_replicates(drawn)
-    among = _distances_among(drawn.steps, threads)
+    pairs = distances_among(StepDistance(), _padded(drawn.steps), threads=threads)
+    among = squareform(pairs)
     lengths = step_length_edges(*(steps[:, 0] for steps in (real, *drawn.steps)), bins=BINS)
     widest = max(float(np.abs(steps[:, 1]).max()) for steps in (real, *drawn.steps))
     return MotionComparison(
@@ -139,14 +142,6 @@ def _require_replicates(found: Replicates) -> None:
 def _distances(first: Sequence[Floats], second: Sequence[Floats], threads: int) -> Floats:
     """Return the KS distances of every recording to every other, (first, second)."""
     return StepDistance().matrix(_padded(first), _padded(second), threads=threads)
-
-
-def _distances_among(steps: Sequence[Floats], threads: int) -> Floats:
-    """Return the KS distance of every recording to every other, (recordings, recordings)."""
-    found = np.zeros((len(steps), len(steps)))
-    among = distances_among(StepDistance(), _padded(steps), threads=threads)
-    found[np.triu_indices(len(steps), 1)] = among
-    return found + found.T
 
 
 def _padded(steps: Sequence[Floats]) -> StepTable:

@@ -6,13 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
-import numpy.typing as npt
-
-from driftwalk.motion.family.columns import State
+from driftwalk.motion.family.columns import Numbers, State
 from driftwalk.motion.family.parts import PARAMETERS, parameters
 from driftwalk.schema import Parameter
-
-Numbers = Mapping[str, npt.ArrayLike]
 
 
 @dataclass(frozen=True)
