@@ -14,7 +14,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.labels import force_label, in_unit, number_label
 from driftwalk.plot.parts.style import BLUE, FONT_PT, INK, PALETTE, axes_points
 from driftwalk.schema.check import kind_name
-from driftwalk.schema.kinds.sensitivity import AXIS_NUMBERS, axis_number
+from driftwalk.schema.kinds.sensitivity import axis_number, ranked_axes
 from driftwalk.schema.shapes import (
     NAMED_SHAPES,
     cells_of_shape,
@@ -145,9 +145,7 @@ def sweep_axes(variable: xr.DataArray, dataset: xr.Dataset) -> list[SweepAxis]:
         The study, for its coordinates and the interval of the force.
     """
     names = [str(dim) for dim in variable.dims if dim not in ("class", "component")]
-    order = [*AXIS_NUMBERS]
-    known = sorted((name for name in names if name in order), key=order.index)
-    return [_sweep_axis(name, dataset) for name in [*known, *(n for n in names if n not in order)]]
+    return [_sweep_axis(name, dataset) for name in ranked_axes(names)]
 
 
 def reference_value(dataset: xr.Dataset, axis: SweepAxis) -> float:

@@ -30,10 +30,10 @@ from driftwalk.core.units import in_percent
 from driftwalk.page import encode_array
 from driftwalk.page.parts import axis, empty_section, section, table_section
 from driftwalk.page.sections.outcomes import cells_of, class_items
-from driftwalk.page.sections.sensitivity_maps import over_time_part, ranked_axes
+from driftwalk.page.sections.sensitivity_maps import over_time_part
 from driftwalk.plot.parts.outcome_classes import are_discs, class_names, classes_to_show
 from driftwalk.schema.answers.yields import LISTED, point_words
-from driftwalk.schema.kinds.sensitivity import axis_number
+from driftwalk.schema.kinds.sensitivity import axis_number, ranked_axes
 from driftwalk.schema.shapes import counted_assemblies
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
