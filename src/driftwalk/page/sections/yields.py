@@ -82,10 +82,7 @@ def front_section(yields: xr.Dataset) -> Section:
     """Return the largest yield over time, and the curves of some settings."""
     require(yields, "time", "share", "front_yield", "front_yield_low", "front_yield_high")
     time = yields["time"].values
-    ends = (yields["front_yield_low"].values, yields["front_yield_high"].values)
-    drawn = [
-        parts.series("best setting of each time", time, yields["front_yield"].values, ends=ends)
-    ]
+    drawn = [parts.course("best setting of each time", time, yields, "front_yield")]
     fresh = np.flatnonzero(yields["fresh_runs"].values > 0)
     order = fresh[np.argsort(-yields["fresh_yield"].values[fresh], kind="stable")]
     drawn += [
