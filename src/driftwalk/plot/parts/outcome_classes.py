@@ -330,6 +330,12 @@ def sketch_size(cells: Floats) -> Floats:
     return size
 
 
+def sketch_sizes(names: Sequence[str]) -> Floats:
+    """Return the size of each sketch, and of what is no class that of one cell."""
+    sizes = [sketch_size(class_cells(name)) if is_class(name) else (1.0, 1.0) for name in names]
+    return np.array(sizes).reshape(-1, 2)
+
+
 def sketch_box(
     name: str,
     *,
@@ -645,13 +651,15 @@ class PoleBarPolicy(NamedTuple):
 POLE_BAR: Final = PoleBarPolicy()
 
 
-def pole_bars(
-    x: Floats, y: Floats, theta: Floats, pole: Any, half_side: float
-) -> tuple[list[Floats], list[str]]:
-    """Return the corners and the colours of the bars of some blocks.
+def set_pole_bars(
+    bars: PolyCollection, x: Floats, y: Floats, theta: Floats, pole: Any, half_side: float
+) -> None:
+    """Give corners and colours of the bars of some blocks to a collection.
 
     Parameters
     ----------
+    bars : matplotlib.collections.PolyCollection
+        As `empty_bars` makes it.
     x, y, theta : ndarray, shape (block,)
         Poses; angles in rad.
     pole : array_like of int, shape (block, 4)
@@ -674,7 +682,8 @@ def pole_bars(
         turned = own @ np.array([[cosine, sine], [-sine, cosine]])
         corners.append(turned + np.array([x[block], y[block]]))
         colors.append(POLE_COLORS[int(pole[block][face])])
-    return corners, colors
+    bars.set_verts(corners)
+    bars.set_facecolor(colors)
 
 
 def empty_bars() -> PolyCollection:
