@@ -51,7 +51,6 @@ def _of_run(folder: Path) -> dict[str, Any]:
     specification = _mapping(manifest.get("specification"))
     version = str(_mapping(manifest.get("software")).get("driftwalk", ""))
     results = [path.name for path in folder.iterdir() if path.is_file()]
-    used = [method._asdict() for method in methods_used(results, specification)]
     parts = [
         f"driftwalk {version}",
         _model(specification, manifest),
@@ -66,7 +65,9 @@ def _of_run(folder: Path) -> dict[str, Any]:
         "computed": "; ".join(parts) + ".",
         "seeds": manifest.get("seeds"),
         "fingerprint": manifest.get("fingerprint"),
-        "methods": [{"what": one["what"], "work": one["work"]} for one in used],
+        "methods": [
+            {"what": one.what, "work": one.work} for one in methods_used(results, specification)
+        ],
     }
 
 
