@@ -9,6 +9,7 @@ import numpy as np
 from driftwalk.core.units import in_percent, percent
 from driftwalk.page import parts
 from driftwalk.page.parts import Maker, Section, require, required
+from driftwalk.page.sections.sensitivity_maps import is_words
 from driftwalk.schema.answers.yields import (
     front_table,
     setting_table,
@@ -104,7 +105,7 @@ def along_sections(yields: xr.Dataset) -> list[Section]:
     found = []
     for name in varied(yields):
         values = yields[name].values
-        if values.dtype == object or len(set(values.tolist())) < 2:
+        if is_words(yields, name) or len(set(values.tolist())) < 2:
             continue
         drawn = []
         for word in ("worse", "alike", "best"):
