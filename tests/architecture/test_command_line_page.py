@@ -63,8 +63,10 @@ def test_help_shows_the_main_options_and_help_all_shows_every_one(
     short = capsys.readouterr().out
     assert main([*name.split(), "--help-all"]) == 0
     assert options <= set(re.findall(r"(?<![\w-])--?[\w-]+", capsys.readouterr().out))
-    rows = re.findall(r"^  --\S+", short, flags=re.M)
-    assert len(rows) <= 8
+    # Below the first heading: the text above them may begin a line with an option.
+    tables = re.split(r"^\w.*:$", short, maxsplit=1, flags=re.M)[1]
+    rows = re.findall(r"^  --\S+", tables, flags=re.M)
+    assert len(rows) <= 6
     assert len(rows) == len(options - {"-o"}) or f"driftwalk {name} --help-all" in short
 
 

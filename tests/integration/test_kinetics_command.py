@@ -34,6 +34,7 @@ def test_a_run_holds_its_answer_and_its_figures(tmp_path: Path) -> None:
     assert again["share"].equals(found["share"])
     assert repr(again).startswith("T is reached in ")
     assert here("report", out, "-o", tmp_path / "page.html").code == 0
+    assert "method    correction for several tests: Holm, " in here("cite", out).out
     made = {part["id"]: part for part in kinetics_sections(kinetics=found)}
     assert made["summary"]["paragraphs"][0].startswith("T is reached in ")
     shown = {one["label"]: one["value"] for one in made["summary"]["numbers"]}

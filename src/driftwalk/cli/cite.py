@@ -12,7 +12,8 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, state_of
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.schema.answers.citation import bibtex, citation, methods_used
-from driftwalk.schema.check import kind_name
+from driftwalk.schema.check import kind_name, require_kind
+from driftwalk.schema.runs import kind_of_folder
 from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 
@@ -51,6 +52,8 @@ def _of_run(folder: Path) -> dict[str, Any]:
     specification = _mapping(manifest.get("specification"))
     version = str(_mapping(manifest.get("software")).get("driftwalk", ""))
     results = [path.name for path in folder.iterdir() if path.is_file()]
+    kind = kind_of_folder(folder, specification)
+    methods = [] if kind is None else methods_used(kind.methods, results, specification)
     parts = [
         f"driftwalk {version}",
         _model(specification, manifest),
@@ -65,9 +68,7 @@ def _of_run(folder: Path) -> dict[str, Any]:
         "computed": "; ".join(parts) + ".",
         "seeds": manifest.get("seeds"),
         "fingerprint": manifest.get("fingerprint"),
-        "methods": [
-            {"what": one.what, "work": one.work} for one in methods_used(results, specification)
-        ],
+        "methods": [{"what": one.what, "work": one.work} for one in methods],
     }
 
 
@@ -77,12 +78,13 @@ def _of_file(path: Path) -> dict[str, Any]:
     if not is_netcdf(path):
         raise InputError(f"{path} is neither a run directory nor a file of driftwalk")
     found = open_netcdf(path)
-    attrs = found.attrs
-    if kind_name(found) != "simulation":
-        kind = kind_name(found) or "of no kind"
-        raise InputError(
-            f"{path} is a dataset '{kind}': cite the run directory that it lies in, or a simulation"
-        )
+    kind = kind_name(found) or "of no kind"
+    attrs = require_kind(
+        found,
+        "simulation",
+        otherwise=f"{path} is a dataset '{kind}': cite the run directory that it lies in, or a "
+        "simulation",
+    ).attrs
     seed = int(attrs["seed"])
     model = str(attrs.get("model", "the block of the paper"))
     if "drag_coefficient" in attrs:

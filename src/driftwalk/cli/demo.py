@@ -15,6 +15,7 @@ from driftwalk.schema.answers.calibration import calibration_answer
 from driftwalk.schema.answers.fit import fit_json
 from driftwalk.schema.answers.parts import estimates, number_text
 from driftwalk.schema.kinds.fit import PARAMETERS
+from driftwalk.schema.runs import run_kind
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 if TYPE_CHECKING:
@@ -71,8 +72,8 @@ def demo(
         # The fit is printed before it is checked.
         work = FitWork([recording], study, None, inputs, fitted=tell)
         if not _run(work, fit, overwrite=overwrite):
-            tell(open_netcdf(fit / "fit.nc"))
-        stored = open_netcdf(fit / "fit.nc")
+            tell(open_netcdf(fit / run_kind("fit").file))
+        stored = open_netcdf(fit / run_kind("fit").file)
         fitted = fit_json(stored, open_netcdf(fit / "check.nc"))
         fitted |= {"flow_error": _flow_error(stored, recording)}
         _write_page(out, FIT)
@@ -83,7 +84,7 @@ def demo(
         inputs = {**inputs, "flow": flow}
         search = CalibrationWork(recording, study, field, None, inputs, threads)
         _run(search, out / CALIBRATION, overwrite=overwrite)
-    calibration = open_netcdf(out / CALIBRATION / "calibration.nc")
+    calibration = open_netcdf(out / CALIBRATION / run_kind("calibration").file)
     _write_page(out, FIT, CALIBRATION)
     if json:
         found = calibration_answer(calibration).facts

@@ -93,6 +93,7 @@ def fit(
     from driftwalk.runs import FitWork, read_earlier_fit, run_work
     from driftwalk.schema.answers.facts import sentences
     from driftwalk.schema.answers.fit import checked_parts, fitted_parts
+    from driftwalk.schema.runs import run_kind
 
     earlier = None if start is None or not Path(start).is_dir() else Path(start)
     before = None if earlier is None else read_earlier_fit(earlier)
@@ -102,7 +103,8 @@ def fit(
         how = replace(how, start=_first_time(start))
     read = read_for_run(recordings, given, how, before=before)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
-    files = {"study": given.file, "flow": flow, "earlier": earlier and earlier / "fit.nc"}
+    fitted = earlier and earlier / run_kind("fit").file
+    files = {"study": given.file, "flow": flow, "earlier": fitted}
     inputs |= {role: path for role, path in files.items() if path}
     field = None if flow is None else load_flow_for(flow, read.study)
     effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))

@@ -25,6 +25,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import STUDY_KEYS
 from driftwalk.core.text_files import parse_json
 from driftwalk.schema.kinds.flow import flow_series_words
+from driftwalk.schema.parameters import is_block
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -228,11 +229,11 @@ def summary(result: xr.Dataset) -> dict[str, Any]:
     path = np.hypot(*(np.diff(result[name].values, axis=1) for name in ("x", "y")))
     elapsed = float(result["time"].values[-1] - result["time"].values[0])
     of_model: dict[str, Any]
-    if "model" in result.attrs:
+    if is_block(result):
+        of_model = {name: result.attrs[name] for name in OF_THE_BLOCK}
+    else:
         values = parse_json(result.attrs["model_parameters"])
         of_model = {"model": result.attrs["model"], "parameters": values}
-    else:
-        of_model = {name: result.attrs[name] for name in OF_THE_BLOCK}
     return {
         "replicates": int(result.sizes["replicate"]),
         "samples": int(result.sizes["time"]),

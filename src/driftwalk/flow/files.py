@@ -29,7 +29,9 @@ from driftwalk.flow.readers.programs import HEAD
 from driftwalk.flow.readers.text import Layout, TextOptions
 from driftwalk.flow.readers.units import FieldOptions, RawField, raw_to_si, y_words
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
-from driftwalk.schema.check import check_contents, kind_name
+from driftwalk.schema.check import check_contents
+from driftwalk.schema.kinds import find_kind
+from driftwalk.schema.kinds.flow import FLOW_FIELD
 from driftwalk.schema.stores.netcdf import is_netcdf, kind_of_file, netcdf_bytes, open_netcdf
 from driftwalk.schema.trajectory import read_arena
 
@@ -134,7 +136,7 @@ def load_flow(
         if said != TextOptions():
             raise InputError(_ONLY_TEXT.format("NetCDF"))
         dataset = open_netcdf(source)
-        if kind_name(dataset) == "flow_field" and "flag" in dataset:
+        if find_kind(dataset) is FLOW_FIELD and "flag" in dataset:
             if arena is not None and own_flags == "refuse":
                 raise InputError("it has its own flags: leave the arena out")
             if options != FieldOptions():

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import kind_name
+from driftwalk.schema.kinds import find_kind
+from driftwalk.schema.kinds.motion import TRAJECTORY
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,6 +82,6 @@ def _page(result: Any) -> dict[str, Any]:
     folder = run_folder(result)
     if folder is not None:
         return report_page(folder)
-    if kind_name(result) in (None, "trajectory"):
+    if find_kind(result) in (None, TRAJECTORY):
         return recording_page(result, describe(result))
     return dataset_page(result)

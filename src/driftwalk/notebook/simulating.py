@@ -273,8 +273,8 @@ def assemble(
     Returns
     -------
     xarray.Dataset
-        An `assembly`, see `driftwalk.assembly.assemble`; `outcome_distribution` makes proportions
-        of it.
+        An `assembly`, see `driftwalk.assembly.assemble`, whose text begins with how often each
+        class formed; `outcome_distribution` makes proportions of it.
 
     Raises
     ------
@@ -291,7 +291,7 @@ def assemble(
     4
     """
     from driftwalk.assembly import assemble as assemble_study
-    from driftwalk.notebook.result import run_in_folder
+    from driftwalk.notebook.result import as_result, run_in_folder
     from driftwalk.runs import AssemblyWork
     from driftwalk.runs.resumable_run import silent
 
@@ -302,15 +302,15 @@ def assemble(
         done = run_in_folder(
             folder, "assemble", work, overwrite, say, executor, warnings=found.warnings
         )
-        made: xr.Dataset = done.assembly
-        return made
-    return assemble_study(
+        return as_result(done.assembly)
+    made = assemble_study(
         found.study,
         found.flow,
         threads=threads,
         executor=executor,
         progress=lambda done, total: say(done, total, "runs"),
     )
+    return as_result(made)
 
 
 class FoundModel(NamedTuple):

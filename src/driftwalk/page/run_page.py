@@ -32,6 +32,7 @@ from driftwalk.schema.runs import (
     RunContents,
     RunKind,
     StoredRun,
+    following_of,
     kind_of,
     open_run_folder,
 )
@@ -434,47 +435,5 @@ def _picture(sections: Sequence[Section]) -> str | None:
 
 def _next(result: xr.Dataset, name: str) -> list[str]:
     """Return what to do after a run: a sentence with a command."""
-    from driftwalk.schema.answers.verdict import DOES_NOT_EXPLAIN, stored_verdict
-    from driftwalk.schema.runs import kind_of, next_command
-
-    verdict, kind = stored_verdict(result), kind_of(result)
-    if verdict is not None and verdict.word == DOES_NOT_EXPLAIN:
-        return ["Do not use the numbers yet: first mend what the verdict names."]
-    run, following = quote(name), next_command(result)
-    if following[:1] == ["assemble"]:
-        return [f"Predict what several such bodies build: `driftwalk assemble {run} -o four`"]
-    # A model in a file of the reader's own has a name here that need not be one there.
-    if following == ["simulate", "motion.nc"]:
-        return [f"Simulate the model: `driftwalk simulate {run} -o motion.nc`"]
-    if kind is not None and kind.name == "assembly":
-        return [f"Learn how fast, and by which steps: `driftwalk kinetics {run} -o kinetics`"]
-    if following == ["control test", "test"]:
-        return [f"Test it in fresh worlds: `driftwalk control test {run} -o test`"]
-    if kind is not None and kind.name == "control_test":
-        return [_after_test(result)]
-    if kind is not None and kind.name == "yield":
-        return [_after_yield(result)]
-    return []
-
-
-def _after_test(test: xr.Dataset) -> str:
-    """Return what to do with a policy that was tested."""
-    from driftwalk.schema.answers.control import gain_word
-
-    if gain_word(test) == "better":
-        return "Follow the policy over what a tracker publishes: `driftwalk control run`"
-    constant = test.attrs["constant_mode"]
-    return (
-        f"Use {constant} all the time, or plan again with more rounds or worlds: "
-        "`driftwalk control plan`"
-    )
-
-
-def _after_yield(found: xr.Dataset) -> str:
-    """Return what to do after a yield: distinguish the settings, or doubt the model."""
-    from driftwalk.schema.answers.yields import more_runs
-
-    more = more_runs(found)
-    if more is not None:
-        return f"Distinguish the settings: the same command with {more} runs that choose"
-    return "See how much it depends on the model: `driftwalk sensitivity RUN -o sensitivity`"
+    advice = following_of(result).advice
+    return [advice.replace("{run}", quote(name))] if advice else []

@@ -24,7 +24,7 @@ from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, draw_scale_bar
 from driftwalk.plot.parts.outcome_classes import empty_bars, poles_of, set_pole_bars
 from driftwalk.plot.parts.style import PALETTE
-from driftwalk.schema.check import kind_name
+from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -145,11 +145,9 @@ def _counted(
 
 
 def _scene(motion: xr.Dataset, run: int) -> _Scene:
-    kind = kind_name(motion) or "a dataset of no kind"
-    if kind not in ("assembly_path", "trajectory"):
-        raise InputError(f"expected a dataset of kind assembly_path or trajectory, got '{kind}'")
+    require_kind(motion, "assembly_path trajectory")
     one, bodies = motion, "body"
-    if kind == "assembly_path":
+    if "run" in motion.dims:
         runs = motion.sizes["run"]
         if not 0 <= run < runs:
             raise InputError(f"run={run}: the dataset has {runs} runs, counted from 0")

@@ -20,7 +20,7 @@ from driftwalk.plot.parts.arena import (
 from driftwalk.plot.parts.outcome_classes import empty_bars, poles_of, set_pole_bars
 from driftwalk.plot.parts.style import PALETTE
 from driftwalk.schema import Track, body_track
-from driftwalk.schema.check import kind_name
+from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -254,13 +254,10 @@ def block_corners(dataset: xr.Dataset) -> Floats:
 
 def _one_run(dataset: xr.Dataset, run: int, *, kind: str = "") -> xr.Dataset:
     """Return the poses and assemblies of one run."""
-    found = kind_name(dataset) or "a dataset of no kind"
-    expected = [kind] if kind else ["assembly", "assembly_path"]
-    if found not in expected:
-        raise InputError(f"expected a dataset of kind '{' or '.join(expected)}', got '{found}'")
+    require_kind(dataset, kind or "assembly assembly_path")
     missing = [name for name in POSES if name not in dataset]
     if missing:
-        raise InputError(f"the dataset '{found}' lacks {', '.join(missing)}: nothing to draw")
+        raise InputError(f"the dataset lacks {', '.join(missing)}: nothing to draw")
     runs = dataset.sizes["run"]
     if not 0 <= run < runs:
         raise InputError(f"run={run}: the dataset has {runs} runs, counted from 0")

@@ -25,6 +25,8 @@ DRAWN_TRIAL: Final = 1
 """The two sets of runs have different random numbers, so that they can be compared."""
 REGION: Final[tuple[str, ...]] = ("region_drag_coefficient", "region_force_std", "refined_surface")
 """Variables of a calibration that parameters are drawn from."""
+COVARIANCE: Final[tuple[str, ...]] = ("estimate", "covariance")
+"""Those of a fit."""
 PATH_RUNS: Final = 4
 """Runs whose paths are kept, for the film and the page; chosen by hand."""
 PATH_INTERVAL_S: Final = 0.1
@@ -35,7 +37,7 @@ PATH_SAMPLES: Final = 6000
 
 @dataclass(frozen=True)
 class AssemblyResult:
-    """Results.
+    """Results, by the names of their files.
 
     Attributes
     ----------
@@ -43,13 +45,13 @@ class AssemblyResult:
         Kind "assembly", of runs with the study's parameters.
     distribution : xarray.Dataset
         Kind "outcome_distribution", of the same runs.
-    times : xarray.Dataset
+    class_times : xarray.Dataset
         Kind "class_times", of the same runs.
-    drawn : xarray.Dataset or None
+    distribution_drawn : xarray.Dataset or None
         Kind "outcome_distribution", of runs with drawn parameters.
     sizes, sizes_drawn : xarray.Dataset or None
         Kind "assembly_sizes", of the same two sets of runs; beyond 8 blocks only.
-    steady : xarray.Dataset or None
+    steady_state : xarray.Dataset or None
         Kind "steady_state", of the runs with the study's parameters; where bonds break only.
     attraction : xarray.Dataset or None
         Kind "attraction", where blocks feel each other at a distance.
@@ -57,11 +59,11 @@ class AssemblyResult:
 
     assembly: xr.Dataset
     distribution: xr.Dataset
-    times: xr.Dataset
-    drawn: xr.Dataset | None
+    class_times: xr.Dataset
+    distribution_drawn: xr.Dataset | None
     sizes: xr.Dataset | None = None
     sizes_drawn: xr.Dataset | None = None
-    steady: xr.Dataset | None = None
+    steady_state: xr.Dataset | None = None
     attraction: xr.Dataset | None = None
 
 
@@ -113,16 +115,17 @@ class AssemblyWork:
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers of the runs."""
+        from driftwalk.assembly.runs.draws import drawn_from
+
         found = self.calibration
-        drawn_from = REGION
-        if found is not None and "covariance" in found:
-            drawn_from = ("estimate", "covariance")
+        source = "" if found is None else drawn_from(found)
+        drawn_names = COVARIANCE if source == "covariance" else REGION
         drawn = {key: values.tolist() for key, values in self.quantiles.items()}
         names = ("u", "v", *(f"{part}_standard_error" for part in "uv"))
         return {
             "study": self.study.to_dict(),
             "flow_sha256": dataset_hash(self.flow, tuple(n for n in names if n in self.flow)),
-            "calibration_sha256": dataset_hash(found, drawn_from),
+            "calibration_sha256": dataset_hash(found, drawn_names),
             **({"quantiles": drawn} if drawn else {}),
             **table_hash(self.study),
         }
@@ -150,7 +153,7 @@ class AssemblyWork:
             progress=course.stage("runs"),
             **how,
         )
-        assembly = run.keep("assembly.nc", assembly)
+        assembly = run.keep_result(assembly)
         distribution, sizes = self._outcomes(assembly, run, "")
         pull = attraction(self.study)
         if pull is not None:
@@ -341,7 +344,7 @@ class SensitivityWork:
         found = sensitivity_map(
             self.study, self.flow, axes=self.axes, reference=reference, **how("map", "map")
         )
-        found = run.keep("sensitivity.nc", found)
+        found = run.keep_result(found)
         components = _components(found)
         if components is not None:
             components = run.keep("components.nc", components)

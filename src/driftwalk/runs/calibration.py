@@ -113,7 +113,6 @@ class CalibrationWork:
         """Calibrate; return a `calibration`, or of many parameters a `model_calibration`."""
         from driftwalk.calibration import calibrate
 
-        file = run_kind(self.kind).file
         if self.used_flow is not None:
             run.keep("flow.nc", self.used_flow)
         run.keep("recording.nc", self.recording)
@@ -129,10 +128,10 @@ class CalibrationWork:
             stores=run.store,
             tell=lambda stage, done, total: tell(*_overall(stage, done, total)),
             # The figures are drawn beside the last simulations, which change none of them.
-            meanwhile=lambda early: run.draw({file: early}),
+            meanwhile=lambda early: run.draw({run_kind(self.kind).file: early}),
         )
         tell(100, 100, "results")
-        found = run.keep(file, found)
+        found = run.keep_result(found)
         if self.posterior:
             run.directory.write("posterior.csv", _posterior_table(found))
         return found
@@ -227,7 +226,7 @@ class ModelComparisonWork:
             tell=run.progress,
             finished=self.finished,
         )
-        return run.keep("comparison.nc", found)
+        return run.keep_result(found)
 
 
 def _specification(work: CalibrationWork | ModelComparisonWork) -> dict[str, Any]:

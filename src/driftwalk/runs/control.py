@@ -90,7 +90,7 @@ class ControlPlanWork:
             executor=run.executor,
             progress=lambda done, total: run.progress(done, total, "worlds"),
         )  # fmt: skip
-        return run.keep("policy.nc", found)
+        return run.keep_result(found)
 
 
 @dataclass(frozen=True)
@@ -163,4 +163,4 @@ class ControlTestWork:
             progress=lambda done, total: run.progress(done, total, "worlds"),
         )  # fmt: skip
         run.keep("path.nc", control_path(self.policy, found))
-        return run.keep("control_test.nc", found)
+        return run.keep_result(found)

@@ -76,8 +76,7 @@ class FoundRun:
         if "model" in found.dims:
             return str(found["model"].values[_best(found)])
         # A calibration of a user's own model may not name it.
-        other = self.kind is not None and self.kind.name == "calibration" and not is_block(found)
-        return str(found.attrs.get("model", "of a user" if other else BLOCK))
+        return str(found.attrs.get("model", BLOCK if is_block(found) else "of a user"))
 
     @property
     def inputs(self) -> dict[str, Path]:
@@ -240,7 +239,7 @@ class FoundRun:
             The study of the run.
         """
         flow = self.flow(study)
-        own = self.kind is not None and self.kind.name == "fit"
+        own = self.kind is not None and self.kind.flow is not None
         if "time" not in flow["u"].dims or "flow" in self.found.dims or not own:
             return flow, None
         from driftwalk.likelihood import fitted_flow

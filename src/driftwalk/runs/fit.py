@@ -117,7 +117,7 @@ class FitWork:
             earlier=self.earlier,
             tell=tell,
         )
-        run.keep("fit.nc", found)
+        run.keep_result(found)
         run.keep("flow.nc", fitted_flow(found))
         for number, recording in enumerate(self.recordings, start=1):
             run.keep("recording.nc" if number == 1 else f"recording-{number}.nc", recording)
@@ -135,7 +135,7 @@ class FitWork:
             if check is not None:
                 check = run.keep("check.nc", check)
         # The fit was stored before, so that a kill does not lose it; now with all that was added.
-        found = run.keep("fit.nc", found)
+        found = run.keep_result(found)
         self.checked_model(found, check)
         course.begin("figures")
         run.draw()
@@ -173,7 +173,7 @@ def read_earlier_fit(source: Path | xr.Dataset) -> EarlierFit:
     1
     """
     from driftwalk.likelihood import EarlierFit
-    from driftwalk.schema.runs import open_run_folder
+    from driftwalk.schema.runs import open_run_folder, run_kind
 
     folder = source if isinstance(source, Path) else run_folder(source)
     if folder is None:
@@ -182,10 +182,11 @@ def read_earlier_fit(source: Path | xr.Dataset) -> EarlierFit:
             "in, or EarlierFit(fit, recordings)"
         )
     run = open_run_folder(folder)
-    found, recordings = run.dataset("fit.nc"), run.recordings()
+    file = run_kind("fit").file
+    found, recordings = run.dataset(file), run.recordings()
     if found is None or not recordings:
         raise InputError(
-            f"{folder} is no finished fit with its recording (fit.nc, recording.nc): make one with "
+            f"{folder} is no finished fit with its recording ({file}, recording.nc): make one with "
             f"driftwalk fit RECORDING -o {folder}"
         )
     return EarlierFit(found, recordings)

@@ -88,7 +88,7 @@ class KineticsWork:
             executor=run.executor,
             progress=lambda done, total: run.progress(done, total, "models"),
         )
-        return run.keep("kinetics.nc", found)
+        return run.keep_result(found)
 
 
 def _hash(found: xr.Dataset) -> str | None:
@@ -168,7 +168,7 @@ class OutcomePosteriorWork:
             threads=self.threads,
             progress=lambda done, total: run.progress(done, total, "runs"),
         )
-        return run.keep("posterior.nc", found)
+        return run.keep_result(found)
 
 
 @dataclass(frozen=True)
@@ -244,4 +244,4 @@ class YieldWork:
             executor=run.executor,
             progress=lambda done, total: run.progress(done, total, "runs"),
         )
-        return run.keep("yields.nc", found)
+        return run.keep_result(found)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Self
 
 from driftwalk.core.processors import default_threads
 from driftwalk.runs.resumable_run import dataset_hash
-from driftwalk.schema.runs import run_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,4 +87,4 @@ class RecoveryWork:
             executor=run.executor,
             tell=run.progress,
         )
-        return run.keep(run_kind(self.kind).file, found)
+        return run.keep_result(found)

@@ -104,6 +104,10 @@ class Run(RunContents):
         self.datasets[name] = kept
         return kept
 
+    def keep_result(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Write the result of the run, under the name that its kind declares; see `keep`."""
+        return self.keep(run_kind(self.kind).file, dataset)
+
     def store(self, name: str, fingerprint: Mapping[str, Any] | None = None) -> Store:
         """Return the store of a sweep's work units, which a continued run finds again."""
         return self.directory.store(name, fingerprint=fingerprint)

@@ -32,8 +32,8 @@ def kind_of_dataset(dataset: xr.Dataset) -> Kind:
     kind = find_kind(dataset)
     if kind is not None:
         return kind
-    name = dataset.attrs.get("kind")
-    if not isinstance(name, str):
+    name = kind_name(dataset)
+    if name is None:
         raise InputError("not a dataset of driftwalk: it has no attribute 'kind'")
     raise InputError(f"no kind of dataset is called '{name}': there are {', '.join(KINDS)}")
 
@@ -44,17 +44,21 @@ def kind_name(dataset: xr.Dataset) -> str | None:
     return name if isinstance(name, str) else None
 
 
-def require_kind(dataset: xr.Dataset, kind: str, advice: str = "") -> xr.Dataset:
-    """Return a dataset of a kind, refuse any other.
+def require_kind(
+    dataset: xr.Dataset, kinds: str, advice: str = "", *, otherwise: str = ""
+) -> xr.Dataset:
+    """Return a dataset of a kind, or of one of several; refuse any other.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Any dataset.
-    kind : str
-        What it has to be.
+    kinds : str
+        What it has to be: a name, or several separated by spaces.
     advice : str
         How such a dataset is made, for the error.
+    otherwise : str
+        The whole error, where this one says too little.
 
     Raises
     ------
@@ -62,9 +66,11 @@ def require_kind(dataset: xr.Dataset, kind: str, advice: str = "") -> xr.Dataset
         When its attribute ``kind`` says something else.
     """
     found = kind_name(dataset)
-    if found != kind:
-        hint = f"; {advice}" if advice else ""
-        raise InputError(f"expected a dataset '{kind}', got {found or 'one of no kind'}{hint}")
+    if found not in kinds.split():
+        wanted, hint = "' or '".join(kinds.split()), f"; {advice}" if advice else ""
+        raise InputError(
+            otherwise or f"expected a dataset '{wanted}', got {found or 'one of no kind'}{hint}"
+        )
     return dataset
 
 
@@ -111,7 +117,7 @@ def refuse_other_version(dataset: xr.Dataset, path: Path | None = None) -> xr.Da
 
     A dataset without a version passes: a file of another program need not state one.
     """
-    kind = KINDS.get(str(dataset.attrs.get("kind")))
+    kind = KINDS.get(kind_name(dataset) or "")
     version = dataset.attrs.get("schema_version")
     if kind is None or version is None:
         return dataset

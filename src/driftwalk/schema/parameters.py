@@ -243,7 +243,7 @@ def stored_parameters(calibration: xr.Dataset) -> tuple[StoredParameter, ...]:
 
 
 def is_block(calibration: xr.Dataset) -> bool:
-    """Return whether a calibration is about the block in a stirred tank.
+    """Return whether a calibration or a simulation is about the block in a stirred tank.
 
     Another model names itself, and may have parameters of the same names.
     """

@@ -181,6 +181,8 @@ def test_the_answer_for_people_stands_side_by_side(calibrated: Path, tmp_path: P
     assert row.count("to") == 2
     assert any(line.startswith("l1 distance of the two: ") for line in lines)
     assert "drawn for each run: drag_coefficient, force_std, flow" in lines
+    # The run says the same afterwards, without the row of its figures.
+    assert here("info", tmp_path / "run").out.splitlines()[1:] == lines[:-1]
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from hypothesis import given, strategies as st
 
+import driftwalk as dw
 from driftwalk.notebook.result import Result, answer_lines, as_result
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 
@@ -42,6 +43,13 @@ def test_the_answer_comes_first() -> None:
         f"<Result: {len(found.data_vars)} variables, {len(found.attrs)} attributes>",
     ]
     assert "0.3880 to 0.3980" in found._repr_html_()
+
+
+def test_runs_of_blocks_say_what_they_built() -> None:
+    runs = dw.assemble(dw.Study(), dw.tank30_flow(), blocks=2, runs=4, duration="1s")
+    lines = repr(runs).splitlines()
+    assert lines[0].startswith("2 blocks, 4 runs of 1 s; C_d = 0.45")
+    assert [line.split()[0] for line in lines[1:4]] == ["class", "2", "1+1"]
 
 
 def test_what_speaks_against_the_model_is_said() -> None:

@@ -88,9 +88,9 @@ def test_what_cannot_be_drawn_is_refused(path) -> None:
     for wrong, message in (
         (lambda: plot_blocks(path, run=2), "run=2: the dataset has 2 runs"),
         (lambda: plot_blocks(path, time=301.0), "lasts from 0 s to 300 s"),
-        (lambda: plot_blocks(path.assign_attrs(kind="trajectory")), "got 'trajectory'"),
+        (lambda: plot_blocks(path.assign_attrs(kind="trajectory")), "got trajectory"),
         (lambda: plot_blocks(path.drop_vars("theta")), "lacks theta"),
-        (lambda: plot_film_strip(assembly_end(path)), "kind 'assembly_path', got 'assembly'"),
+        (lambda: plot_film_strip(assembly_end(path)), "dataset 'assembly_path', got assembly"),
         (lambda: plot_film_strip(path, count=1), "at least 2 moments"),
         (lambda: plot_film_strip(path, [1], count=2), "got 1 axes, expected 2"),
     ):

@@ -133,7 +133,7 @@ def test_line_divides_one_assembly_from_several() -> None:
 
 def test_what_cannot_be_drawn_is_refused() -> None:
     data = distribution()
-    with pytest.raises(InputError, match="kind 'outcome_distribution', got 'assembly'"):
+    with pytest.raises(InputError, match="dataset 'outcome_distribution', got assembly"):
         plot_outcomes(data.assign_attrs(kind="assembly"))
     with pytest.raises(InputError, match="lacks interval_low"):
         plot_outcomes(data.drop_vars("interval_low"))

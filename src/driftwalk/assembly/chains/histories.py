@@ -11,7 +11,7 @@ from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.outcome_classes import class_shapes
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import kind_name
+from driftwalk.schema.check import require_kind
 from driftwalk.schema.shapes import MOST_NAMED, all_single, counted_assemblies
 
 if TYPE_CHECKING:
@@ -102,13 +102,8 @@ def histories(datasets: Sequence[xr.Dataset], *, classes: Sequence[str] | None =
     """
     rows: list[tuple[list[str], Floats, float]] = []
     for found in datasets:
-        kind = kind_name(found)
-        if kind not in ("assembly", "classification"):
-            raise InputError(
-                f"kinetics needs runs of an assembly or a classification, got a dataset of kind "
-                f"{kind!r}"
-            )
-        rows += _of_runs(found) if kind == "assembly" else _of_recording(found)
+        require_kind(found, "assembly classification", "kinetics need one of them")
+        rows += _of_runs(found) if "run" in found.dims else _of_recording(found)
     passed = dict.fromkeys(name for row in rows for name in row[0])
     if counted := [name for name in passed if counted_assemblies(name)]:
         raise InputError(

@@ -32,7 +32,8 @@ from driftwalk.core.arrays import Bools, Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.model import declared
 from driftwalk.schema.answers.facts import fitted_value
-from driftwalk.schema.check import kind_name, refuse_other_version
+from driftwalk.schema.check import refuse_other_version
+from driftwalk.schema.runs import kind_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,7 +100,7 @@ def draw_parameters(
     >>> draw_parameters(calibration, runs=2).drag_coefficient  # doctest: +SKIP
     array([0.3874, 0.3921])
     """
-    if kind_name(calibration) == "fit":
+    if drawn_from(calibration) == "covariance":
         numbers = draw_posterior(calibration, runs=runs, seed=seed, trial=trial)
         return DrawnParameters(numbers["drag_coefficient"], numbers["force_std_N"])
     region = _region_of(calibration)
@@ -127,8 +128,14 @@ def has_uncertainty(found: xr.Dataset) -> bool:
     >>> has_uncertainty(xr.Dataset(attrs={"kind": "model_comparison"}))
     False
     """
-    kind = kind_name(found)
-    return has_covariance(found) if kind == "fit" else kind == "calibration" and has_region(found)
+    holds = {"covariance": has_covariance, "region": has_region}.get(drawn_from(found))
+    return holds is not None and holds(found)
+
+
+def drawn_from(found: xr.Dataset) -> str:
+    """Return what of a dataset parameters are drawn from: "covariance", "region" or ""."""
+    kind = kind_of(found)
+    return "" if kind is None else kind.drawn_from
 
 
 def has_region(calibration: xr.Dataset) -> bool:

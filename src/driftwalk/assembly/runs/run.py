@@ -19,6 +19,7 @@ from driftwalk.assembly.runs.draws import (
     draw_parameters,
     draw_posterior,
     draw_quantiles,
+    drawn_from,
     has_standard_error,
 )
 from driftwalk.assembly.runs.plan import Backend, Plan, make_plan, simulate_rows, start_poses
@@ -27,7 +28,6 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.progress import Progress
-from driftwalk.schema.check import kind_name
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, settings_per_unit, threads_of_unit
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def assemble_drawn(
     # The draws of run k depend on these alone, not on how the runs are shared out to workers.
     address = {"runs": settings.runs, "seed": settings.seed, "trial": trial}
     drawn = draw_parameters(calibration, **address)
-    is_fit = kind_name(calibration) == "fit"
+    is_fit = drawn_from(calibration) == "covariance"
     numbers = draw_posterior(calibration, **address) if is_fit else {}
     law = {f"forces.{key}": values for key, values in numbers.items()}
     law = {key: values for key, values in law.items() if key in LAW_NAMES}

@@ -222,13 +222,14 @@ def vary_strengths(given: list[str]) -> dict[str, list[float]]:
 
 def _opened(policy: Path) -> tuple[Any, Path]:
     """Return the policy of a run or a file, and its file."""
-    from driftwalk.schema.check import check_contents, kind_name
+    from driftwalk.schema.check import check_contents, require_kind
+    from driftwalk.schema.runs import run_kind
     from driftwalk.schema.stores.netcdf import open_netcdf
 
-    path = policy / "policy.nc" if policy.is_dir() else policy
+    kind = run_kind("control_policy")
+    lacks = "holds no policy: plan one first (driftwalk control plan)"
+    path = policy / kind.file if policy.is_dir() else policy
     if not path.is_file():
-        raise InputError(f"{policy} holds no policy: plan one first (driftwalk control plan)")
-    found = open_netcdf(path)
-    if kind_name(found) != "control_policy":
-        raise InputError(f"{path} holds no policy: plan one first (driftwalk control plan)")
+        raise InputError(f"{policy} {lacks}")
+    found = require_kind(open_netcdf(path), kind.name, otherwise=f"{path} {lacks}")
     return check_contents(found, path), path

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from driftwalk.cli.options.run import RunOptions, with_run_options
+from driftwalk.cli.options.flatten_options import with_options
+from driftwalk.cli.options.run import RunOptions
 from driftwalk.cli.options.shared_types import PANEL, argument, option
 from driftwalk.core.errors import InputError
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@with_run_options
+@with_options(RunOptions, "out", "cluster", "cluster_options", "overwrite", "json")
 def kinetics(
     sources: Annotated[
         list[Path],
@@ -65,6 +66,7 @@ def kinetics(
 def files_of(source: Path) -> list[Path]:
     """Return the files of a source: the assembly of a run, or all classifications of a folder."""
     from driftwalk.core.files.run_layout import state_of
+    from driftwalk.schema.runs import run_kind
 
     if source.is_file():
         return [source]
@@ -73,7 +75,7 @@ def files_of(source: Path) -> list[Path]:
     state = state_of(source)
     if state == "unfinished":
         raise InputError(f"{source} holds a run that is not finished: run its command again")
-    path = source / "assembly.nc"
+    path = source / run_kind("assembly").file
     if path.is_file():
         return [path]
     found = sorted(source.glob("*.nc")) if state == "new" else []
@@ -87,13 +89,13 @@ def files_of(source: Path) -> list[Path]:
 
 def opened_histories(path: Path) -> xr.Dataset:
     """Return the dataset of a file that holds outcome classes over time."""
-    from driftwalk.schema.check import check_contents, kind_name
+    from driftwalk.schema.check import check_contents, require_kind
     from driftwalk.schema.stores.netcdf import open_netcdf
 
-    found = open_netcdf(path)
-    if kind_name(found) not in ("assembly", "classification"):
-        raise InputError(
-            f"{path} holds no outcome classes over time: give a run of driftwalk assemble, or "
-            f"classify the recording first (driftwalk classify {path} -o events.nc)"
-        )
+    found = require_kind(
+        open_netcdf(path),
+        "assembly classification",
+        otherwise=f"{path} holds no outcome classes over time: give a run of driftwalk assemble, "
+        f"or classify the recording first (driftwalk classify {path} -o events.nc)",
+    )
     return check_contents(found, path)

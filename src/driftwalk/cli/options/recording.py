@@ -41,7 +41,7 @@ class RecordingOptions:
         "gives its centre in metres.",
     )
     fps: float | None = _option("--fps", "Frames per second, if the file counts frames.", unit="Hz")
-    scale: float | None = _option("--scale <m>", SCALE, parser=parse_scale)
+    scale: float | None = _option("--scale m", SCALE, parser=parse_scale)
     length_unit: str | None = _option(
         "--length-unit m|cm|mm|um|ft|in|px", "Unit of positions, if the file names none."
     )

@@ -66,7 +66,7 @@ def option(
     return typer.Option(
         *(word for word in words if word.startswith("-")),
         help=help,
-        metavar=f"<{unit}>" if unit else "".join(placeholders) or None,
+        metavar=unit or "".join(placeholders) or None,
         rich_help_panel=panel,
         **more,
     )

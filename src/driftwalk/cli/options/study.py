@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 PANELS: Final = {"flow": "Flow field (over the study file)"}
 """Panels of the help for sections of a study; the other keys stand in `PANEL`."""
 TANK: Final = "tank.diameter_m"
-WITH_SECOND: Final = {"bond_rate": "<1/s[,N]>"}
+WITH_SECOND: Final = {"bond_rate": "1/s[,N]"}
 """Options of two numbers, the second of which may be left out, and their placeholders."""
 
 
@@ -201,8 +201,8 @@ def _metavar(key: Declaration) -> str | None:
         return "|".join(key.words) or None
     unit = key.quantity.unit if key.quantity.unit != "1" else "NUMBER"
     if key.is_list:
-        return f"<{unit},{unit},...>"
-    return "N" if key.quantity.whole else f"<{'|'.join((*key.words, unit))}>"
+        return f"{unit},{unit},..."
+    return "N" if key.quantity.whole else "|".join((*key.words, unit))
 
 
 def _items(value: Any) -> Any:

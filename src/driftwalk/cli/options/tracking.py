@@ -37,12 +37,12 @@ class TrackingOptions:
     tank: float | None = _found(
         "--tank", "Inner diameter of the tank, whose rim gives the scale.", unit="m"
     )
-    scale: float | None = _found("--scale <m>", SCALE, parser=parse_scale)
+    scale: float | None = _found("--scale m", SCALE, parser=parse_scale)
     polarity: str | None = _found(
         "--polarity dark|bright|both", "Objects for --markers blob (default: detected)."
     )
-    min_area_px: float | None = _found("--min-area-px <px2>", "Smallest area for --markers blob.")
-    max_area_px: float | None = _found("--max-area-px <px2>", "Largest area for --markers blob.")
+    min_area_px: float | None = _found("--min-area-px px2", "Smallest area for --markers blob.")
+    max_area_px: float | None = _found("--max-area-px px2", "Largest area for --markers blob.")
     fps: float | None = _found(
         "--fps", "Frames per second of a folder without times.csv.", unit="Hz"
     )

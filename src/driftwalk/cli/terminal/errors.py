@@ -22,18 +22,13 @@ EXIT_INTERRUPTED = 130
 """128 and the number of SIGINT, as shells have it."""
 EXIT_BROKEN_PIPE = 141
 """128 and the number of SIGPIPE, as shells have it."""
-# What other programs, and earlier versions, call an option or a command, and what it is here.
+# What other programs call an option, and what it is here.
 _SYNONYMS = {
     **dict.fromkeys(("--arena", "--tank-diameter", "--diameter"), "--tank"),
     **dict.fromkeys(("--frame-rate", "--image-rate"), "--fps"),
     **dict.fromkeys(("--metres-per-pixel", "--px-per-m", "--pixel-size"), "--scale"),
-    **dict.fromkeys(("--parameters-from", "--from-run"), "RUN"),
-    "--truth": "RUN or --study",
     "--live": "ADDRESS:PORT",
-    "--least-area-px": "--min-area-px",
-    "--most-area-px": "--max-area-px",
-    **dict.fromkeys(("--world", "--run"), "--replicate"),
-    "convert": "driftwalk read",
+    "--run": "--replicate",
 }
 _LONGEST = 1500
 """Characters of a message; it may quote what a file holds; chosen by hand."""
@@ -111,7 +106,7 @@ def _usage_message(error: BaseException) -> str:
         return message
     message = message.rstrip(".")
     option = getattr(error, "option_name", None)
-    wanted = _SYNONYMS.get(option or message.partition("'")[2].rstrip("'"))
+    wanted = _SYNONYMS.get(option or "")
     known = {name for one in context.command.params for name in one.opts}
     if wanted is not None and (not wanted.startswith("--") or wanted in known):
         message = f"{message.partition(' (Possible')[0]}; did you mean {wanted}?"

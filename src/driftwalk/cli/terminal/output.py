@@ -274,17 +274,13 @@ def print_places(
 ) -> None:
     """Print the warnings, where everything is, and the command that comes next."""
     print_warnings(warnings)
-    from driftwalk.schema.answers.verdict import DOES_NOT_EXPLAIN, stored_verdict
-    from driftwalk.schema.runs import kind_of, next_command
+    from driftwalk.schema.runs import following_of, kind_of
 
-    kind, verdict = kind_of(found), stored_verdict(found)
+    kind, following = kind_of(found), following_of(found).command
     assert kind is not None, "the result of a run"
     for label, name in kind.places.items():
         print_row(label, folder / name)
-    following = next_command(found)
-    # Nothing follows from numbers that are not to be used.
-    refused = verdict is not None and verdict.word == DOES_NOT_EXPLAIN
-    if refused or not (words or following):
+    if not (words or following):
         print_report_next(folder)
         return
     print_row("all in one page", command_text("report", folder, "-o", "report.html"))

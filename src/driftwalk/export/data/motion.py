@@ -13,6 +13,7 @@ from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, run_file, run_files, state_of
 from driftwalk.core.text_files import read_json
+from driftwalk.schema.kinds.assembly import ASSEMBLY
 from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 from driftwalk.schema.trajectory import block_of_study
 
@@ -88,7 +89,7 @@ def _of_file(file: Path, replicate: int | None) -> list[Motion]:
     kind = kind_of_file(file) if file.is_file() else None
     if kind in OF_WORLDS:
         return list(_of_worlds(file, kind, replicate))
-    if kind == "assembly":
+    if kind == ASSEMBLY.name:
         raise InputError(
             f"{file} holds only the ends of the runs: give the run directory, whose path.nc holds "
             "the whole way of some"
@@ -113,10 +114,10 @@ def _of_worlds(file: Path, kind: str, replicate: int | None) -> Iterator[Motion]
     for number in known if replicate is None else [replicate]:
         recording = (
             path_recording(stored, run=number)
-            if kind == "assembly_path"
+            if dimension == "run"
             else load(file, replicate=known.index(number))
         )
-        if kind == "assembly_path":
+        if dimension == "run":
             recording["assembly"] = (
                 ("time", "body"),
                 stored["assembly"].sel(run=number).transpose("time", "block").values,

@@ -13,7 +13,7 @@ from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.labels import force_label, in_unit, number_label
 from driftwalk.plot.parts.style import BLUE, FONT_PT, INK, PALETTE, axes_points
-from driftwalk.schema.check import kind_name
+from driftwalk.schema.check import require_kind
 from driftwalk.schema.kinds.sensitivity import axis_number, ranked_axes
 from driftwalk.schema.shapes import (
     NAMED_SHAPES,
@@ -48,9 +48,7 @@ class SweepAxis(NamedTuple):
 
 def check_kind(dataset: xr.Dataset, kind: str, *variables: str) -> None:
     """Raise `InputError` unless the dataset is of this kind and has these variables."""
-    found = kind_name(dataset) or "a dataset of no kind"
-    if found != kind:
-        raise InputError(f"expected a dataset of kind '{kind}', got '{found}'")
+    require_kind(dataset, kind)
     missing = [name for name in variables if name not in dataset.variables]
     if missing:
         raise InputError(f"the dataset '{kind}' lacks {', '.join(missing)}: nothing to draw")

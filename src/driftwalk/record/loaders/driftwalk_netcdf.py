@@ -11,8 +11,10 @@ from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text_files import parse_toml
 from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
-from driftwalk.schema.check import check_contents, kind_name
-from driftwalk.schema.kinds import KINDS
+from driftwalk.schema.check import check_contents
+from driftwalk.schema.kinds import find_kind
+from driftwalk.schema.kinds.motion import SIMULATION, TRAJECTORY
+from driftwalk.schema.parameters import is_block
 from driftwalk.schema.stores.netcdf import MAGIC, kind_of_file, open_netcdf
 from driftwalk.schema.trajectory import POSE, block_of_study
 
@@ -34,7 +36,7 @@ class DriftwalkLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every body and carry the attributes over; of a simulation one replicate."""
         dataset = check_contents(open_netcdf(path), path)
-        if kind_name(dataset) == "simulation":
+        if find_kind(dataset) is SIMULATION:
             dataset = _replicate(dataset, options.replicate)
         try:
             check_trajectory(dataset)
@@ -63,11 +65,11 @@ def _replicate(simulation: xr.Dataset, replicate: int) -> xr.Dataset:
         raise InputError(f"no `replicate` {replicate}: the simulation has {count}, counted from 0")
     chosen = simulation[list(POSE)].isel(replicate=replicate, drop=True)
     kept = {name: simulation.attrs[name] for name in ("arena",) if name in simulation.attrs}
-    if "model" not in simulation.attrs and "study" in simulation.attrs:
+    if is_block(simulation) and "study" in simulation.attrs:
         kept |= block_of_study(parse_toml(str(simulation.attrs["study"])))
         if "force_interval_s" in simulation.attrs:
             kept["force_interval_s"] = simulation.attrs["force_interval_s"]
-    version = KINDS["trajectory"].version
+    version = TRAJECTORY.version
     chosen.attrs = {"kind": "trajectory", "schema_version": version, "simulated": "yes", **kept}
     return chosen
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each, interval_cells
+from driftwalk.schema.kinds.flow import flow_series_words
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def assembly_answer(
     apart: Mapping[str, float] | None = None,
     attraction: xr.Dataset | None = None,
 ) -> Answer:
-    """Return the answer of an assembly run; the caller knows its warnings.
+    """Return the answer of an assembly run.
 
     Parameters
     ----------
@@ -123,7 +124,20 @@ def assembly_answer(
         **(apart or {}),
         **({} if attraction is None else {"attraction": _attraction_json(attraction)}),
     }
-    return Answer(parts, answer, [])
+    return Answer(
+        parts,
+        answer,
+        [*flow_series_words(facts, holds="the intervals hold"), *_left_out(found, drawn)],
+    )
+
+
+def _left_out(found: xr.Dataset, drawn: xr.Dataset | None) -> list[str]:
+    """Return a warning where runs have no outcome."""
+    return [
+        f"{one.attrs['left_out']} runs{what} broke down and are left out; use a smaller time step"
+        for what, one in (("", found), (" with drawn parameters", drawn))
+        if one is not None and one.attrs["left_out"]
+    ]
 
 
 def attraction_words(attraction: xr.Dataset) -> str:

@@ -10,7 +10,9 @@ import numpy as np
 from driftwalk.schema.answers.facts import facts_of, flat_variables, sentences
 from driftwalk.schema.answers.model_comparison import own_score
 from driftwalk.schema.answers.parts import (
+    PREDICT,
     Answer,
+    Following,
     Row,
     by_name,
     each,
@@ -119,3 +121,18 @@ def _parameter(one: xr.Dataset) -> dict[str, Any]:
 
 def _key(one: xr.Dataset) -> str:
     return flat_name(str(one["parameter"].values), str(one["unit"].values))
+
+
+def after_calibration(found: xr.Dataset) -> Following:
+    """Return what comes after a `calibration`."""
+    return PREDICT if is_block(found) else simulate_model(found)
+
+
+def simulate_model(found: xr.Dataset) -> Following:
+    """Return what comes after the calibration of another model than the block."""
+    if "model_source_sha256" in found.attrs:
+        # The user names a model that is none of driftwalk's own; on a page its name says nothing.
+        return Following(("simulate", str(found.attrs["model"]), "motion.nc"))
+    return Following(
+        ("simulate", "motion.nc"), "Simulate the model: `driftwalk simulate {run} -o motion.nc`"
+    )

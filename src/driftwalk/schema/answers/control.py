@@ -8,7 +8,16 @@ import numpy as np
 
 from driftwalk.core.intervals import proportion_interval
 from driftwalk.core.units import in_percent
-from driftwalk.schema.answers.parts import Answer, Part, Row, Table, each, interval_cells, records
+from driftwalk.schema.answers.parts import (
+    Answer,
+    Following,
+    Part,
+    Row,
+    Table,
+    each,
+    interval_cells,
+    records,
+)
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -106,6 +115,18 @@ def gain_word(test: xr.Dataset) -> str:
     if float(test["gain_low"][CONSTANT]) > 0.0:
         return "better"
     return "worse" if float(test["gain_high"][CONSTANT]) < 0.0 else "cannot be distinguished"
+
+
+def after_test(test: xr.Dataset) -> Following:
+    """Return what to do with a policy that was tested."""
+    if gain_word(test) == "better":
+        return Following(
+            advice="Follow the policy over what a tracker publishes: `driftwalk control run`"
+        )
+    return Following(
+        advice=f"Use {test.attrs['constant_mode']} all the time, or plan again with more rounds "
+        "or worlds: `driftwalk control plan`"
+    )
 
 
 def arm_table(test: xr.Dataset) -> Table:

@@ -15,6 +15,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.text_files import parse_json
+from driftwalk.schema.check import kind_name
 from driftwalk.schema.description import Kind, Number, Variable
 from driftwalk.schema.kinds.calibration import CALIBRATION, OPTIMUM, calibration_of
 from driftwalk.schema.kinds.fit import FIT, PARAMETERS
@@ -38,6 +39,8 @@ _PREFIXES: Final = {
 """Variable along the parameters to what stands in front of the flat names."""
 _ROWS: Final = ("", "bound", "axis", "switch", "flow")
 """Dimensions of what is a fact: a number, a pair, a few times."""
+_WITH_FACTS: Final = {kind.name: kind for kind in (FIT, CALIBRATION)}
+"""Kinds whose variables are facts."""
 _TYPES: Final = {"float": np.float64, "int": np.int64}
 
 
@@ -92,7 +95,7 @@ def facts_of(dataset: xr.Dataset) -> dict[str, Any]:
     (0.03, 0.02)
     """
     facts: dict[str, Any] = {str(key): value for key, value in dataset.attrs.items()}
-    kind = {"fit": FIT, "calibration": CALIBRATION}.get(str(dataset.attrs.get("kind")))
+    kind = _WITH_FACTS.get(kind_name(dataset) or "")
     if kind is None:
         return facts
     if kind is CALIBRATION:
@@ -253,8 +256,8 @@ def fitted_value(fit: xr.Dataset, parameter: str) -> float:
     """
     known = [str(name) for name in fit["parameter"].values]
     if parameter not in known:
-        kind = fit.attrs.get("kind", "fit")
-        raise InputError(f"the {kind} has no {parameter}: it has {', '.join(known)}")
+        has = f"the {kind_name(fit) or 'fit'} has no {parameter}"
+        raise InputError(f"{has}: it has {', '.join(known)}")
     return float(fit["estimate"].values[known.index(parameter)])
 
 

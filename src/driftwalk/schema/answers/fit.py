@@ -29,8 +29,10 @@ from driftwalk.schema.answers.force_law import (
     wall_estimates,
 )
 from driftwalk.schema.answers.parts import (
+    PREDICT,
     Answer,
     Estimate,
+    Following,
     Part,
     Row,
     Table,
@@ -38,10 +40,13 @@ from driftwalk.schema.answers.parts import (
     estimates,
     intensity_row,
     origin,
+    undetermined,
 )
 from driftwalk.schema.answers.verdict import stored_verdict, verdict_facts, verdict_parts
-from driftwalk.schema.check import described
+from driftwalk.schema.check import described, require_kind
+from driftwalk.schema.kinds import find_kind
 from driftwalk.schema.kinds.fit import FIT, LAW_NUMBERS, PARAMETERS
+from driftwalk.schema.kinds.model_check import MODEL_CHECK
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,6 +75,11 @@ _NOT_IN_JSON: Final = frozenset(
     }
 )
 """Facts for programs that read fit.nc: of the second fit, of the flow's splines, of the search."""
+
+
+def after_fit(fit: xr.Dataset) -> Following:
+    """Return what comes after a fit: nothing can be simulated with what is not known."""
+    return Following() if undetermined(fit) else PREDICT
 
 
 def fit_answer(fit: xr.Dataset, *, check: xr.Dataset | None = None) -> Answer:
@@ -303,14 +313,9 @@ def residuals_of(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         When the dataset is neither, or the fit was not checked.
     """
-    kind = dataset.attrs.get("kind")
-    if kind == "model_check":
+    require_kind(dataset, "fit model_check", "check_model makes a model check")
+    if find_kind(dataset) is MODEL_CHECK:
         return dataset
-    if kind != "fit":
-        raise InputError(
-            f"a fit or a model check has residuals, got a dataset of kind {kind!r}; "
-            "check_model makes a model check"
-        )
     if "residual" not in dataset:
         why = dataset.attrs.get("check_left_out", "check_model makes a model check")
         raise InputError(f"the fit was not checked, so it has no residuals: {why}")

@@ -122,6 +122,22 @@ class Answer(NamedTuple):
     warnings: list[str]
 
 
+class Following(NamedTuple):
+    """The command that follows a run, and the advice that a page gives."""
+
+    command: tuple[str, ...] = ()
+    """The command that takes it further, its model, and a name for its result; none: a page."""
+    advice: str = ""
+    """A sentence with a command, in which ``{run}`` is the run directory."""
+
+
+PREDICT: Final = Following(
+    ("assemble", "assembly"),
+    "Predict what several such bodies build: `driftwalk assemble {run} -o four`",
+)
+"""After parameters of the block."""
+
+
 def number_text(value: float, digits: int = DIGITS) -> str:
     """Return a number with its significant digits, zeros included.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.units import in_percent
-from driftwalk.schema.answers.parts import Answer, Part, Row, Table, interval_cells
+from driftwalk.schema.answers.parts import Answer, Following, Part, Row, Table, interval_cells
 from driftwalk.schema.answers.sensitivity import key_of
 from driftwalk.schema.kinds.sensitivity import AXES, axis_number
 from driftwalk.schema.shapes import short_class
@@ -144,6 +144,18 @@ def more_runs(found: xr.Dataset) -> int | None:
     needed = facts["selection_runs"] * (facts["within"] / facts["indifference"]) ** 2
     digit = 10 ** math.floor(math.log10(needed))
     return int(math.ceil(needed / digit) * digit)
+
+
+def after_yield(found: xr.Dataset) -> Following:
+    """Return what comes after a yield: distinguish the settings, or doubt the model."""
+    more = more_runs(found)
+    if more is not None:
+        return Following(
+            advice=f"Distinguish the settings: the same command with {more} runs that choose"
+        )
+    return Following(
+        advice="See how much it depends on the model: `driftwalk sensitivity RUN -o sensitivity`"
+    )
 
 
 def setting_table(found: xr.Dataset) -> Table:

@@ -38,6 +38,6 @@ def find_kind(dataset: xr.Dataset) -> Kind | None:
     """
     name = dataset.attrs.get("kind")
     kind = KINDS.get(name) if isinstance(name, str) else None
-    if kind is not None and kind.name == "calibration" and not is_block(dataset):
+    if kind is calibration.CALIBRATION and not is_block(dataset):
         return calibration.calibration_of(stored_parameters(dataset))
     return kind

@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.answers import citation as cite
+from driftwalk.schema.answers.parts import Answer, Following
 from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from driftwalk.schema.answers.parts import Answer
 
 Maker = str | Callable[..., Any]
 """A callable, or where it stands, "module:name": its module is imported when it is used."""
@@ -58,8 +58,14 @@ class RunKind:
         Files and folders of a run that its command names, by their labels.
     flow : callable or str, optional
         Returns the flow field that its result holds.
+    following : Following, callable or str, optional
+        What comes after it; a callable returns that of its result.
+    methods : tuple of driftwalk.schema.answers.citation.Method
+        What of others it uses, to be cited.
     gives_model : bool
         Whether later commands take a motion model with its values from it.
+    drawn_from : {"", "covariance", "region"}
+        What of its result parameters are drawn from, where it holds that.
     no_draws : str
         What is missing where no parameters can be drawn from its result.
     """
@@ -77,7 +83,10 @@ class RunKind:
     answer: Maker | None = None
     places: Mapping[str, str] = field(default_factory=dict)
     flow: Maker | None = None
+    following: Following | Maker | None = None
+    methods: tuple[cite.Method, ...] = ()
     gives_model: bool = False
+    drawn_from: Literal["", "covariance", "region"] = ""
     no_draws: str = "no uncertainty of its values, as a fit or a calibration has"
 
 
@@ -118,9 +127,12 @@ BUILT_IN: Final = (
         page=f"{_SECTIONS}.calibration:calibration_sections",
         live=f"{_WATCH}.calibration:RunningCalibration",
         gives_model=True,
+        drawn_from="region",
         no_draws="no joint region to draw parameters from (`calibration.bootstrap` of 0)",
         answer=f"{_ANSWERS}.calibration:calibration_answer",
         places={"figures": "figures"},
+        following=f"{_ANSWERS}.calibration:after_calibration",
+        methods=(cite.KS_DISTANCE, cite.RANDOM_NUMBERS),
     ),
     RunKind(
         name="fit",
@@ -134,9 +146,16 @@ BUILT_IN: Final = (
         page=f"{_SECTIONS}.fit:fit_sections",
         flow="driftwalk.likelihood:fitted_flow",
         gives_model=True,
+        drawn_from="covariance",
         no_draws="no covariance to draw parameters from",
         answer=f"{_ANSWERS}.fit:fit_answer",
         places={"flow": "flow.nc"},
+        following=f"{_ANSWERS}.fit:after_fit",
+        methods=(
+            cite.RESTRICTED_LIKELIHOOD,
+            cite.PARTICLE_FILTER,
+            cite.RANDOM_NUMBERS._replace(dataset="check"),
+        ),
     ),
     RunKind(
         name="assembly",
@@ -159,6 +178,11 @@ BUILT_IN: Final = (
         figures="driftwalk.figures.assembly:assembly_figures",
         page=f"{_SECTIONS}.assembly:assembly_sections",
         live=f"{_WATCH}.assembly:RunningAssembly",
+        answer="driftwalk.assembly.outcomes.run_answer:assembly_run_answer",
+        following=Following(
+            advice="Learn how fast, and by which steps: `driftwalk kinetics {run} -o kinetics`"
+        ),
+        methods=(cite.EXACT_INTERVALS, cite.SURVIVAL_CURVES, cite.RANDOM_NUMBERS),
     ),
     RunKind(
         name="sensitivity",
@@ -172,6 +196,7 @@ BUILT_IN: Final = (
         page=f"{_SECTIONS}.sensitivity:sensitivity_sections",
         live=f"{_WATCH}.assembly:RunningSensitivity",
         answer=f"{_ANSWERS}.sensitivity:sensitivity_answer",
+        methods=(cite.SOBOL_INDICES, cite.RANDOM_NUMBERS),
     ),
     RunKind(
         name="kinetics",
@@ -184,6 +209,7 @@ BUILT_IN: Final = (
         page=f"{_SECTIONS}.kinetics:kinetics_sections",
         answer=f"{_ANSWERS}.kinetics:kinetics_answer",
         places={"figures": "figures"},
+        methods=(cite.HIDDEN_STATES, cite.SEVERAL_TESTS),
     ),
     RunKind(
         name="outcome_posterior",
@@ -196,6 +222,14 @@ BUILT_IN: Final = (
         page=f"{_SECTIONS}.outcome_posterior:outcome_posterior_sections",
         answer=f"{_ANSWERS}.outcome_posterior:outcome_posterior_answer",
         places={"figures": "figures"},
+        methods=(
+            cite.DIRICHLET_EMULATOR,
+            cite.SYNTHETIC_LIKELIHOOD,
+            cite.NODES_OF_EMULATOR,
+            cite.SELF_CHECK,
+            cite.LOGARITHMIC_SCORE,
+            cite.RANDOM_NUMBERS,
+        ),
     ),
     RunKind(
         name="yield",
@@ -209,6 +243,15 @@ BUILT_IN: Final = (
         live=f"{_WATCH}.assembly:RunningYield",
         answer=f"{_ANSWERS}.yields:yield_answer",
         places={"figures": "figures"},
+        following=f"{_ANSWERS}.yields:after_yield",
+        methods=(
+            cite.SUCCESSIVE_HALVING,
+            cite.COMPASS_SEARCH,
+            cite.CONFIDENCE_SEQUENCE,
+            cite.INDIFFERENCE_ZONE,
+            cite.EXACT_INTERVALS,
+            cite.RANDOM_NUMBERS,
+        ),
     ),
     RunKind(
         name="control_policy",
@@ -221,6 +264,18 @@ BUILT_IN: Final = (
         page=f"{_SECTIONS}.control:policy_sections",
         answer=f"{_ANSWERS}.control:policy_answer",
         places={"figures": "figures"},
+        following=Following(
+            ("control test", "test"),
+            "Test it in fresh worlds: `driftwalk control test {run} -o test`",
+        ),
+        methods=(
+            cite.DECISION_PROCESS,
+            cite.DRAWN_POLICIES,
+            cite.ROLLOUTS,
+            cite.PROBABILITY_MATCHING,
+            cite.EXACT_INTERVALS,
+            cite.RANDOM_NUMBERS,
+        ),
     ),
     RunKind(
         name="control_test",
@@ -234,6 +289,8 @@ BUILT_IN: Final = (
         page=f"{_SECTIONS}.control:trial_sections",
         answer=f"{_ANSWERS}.control:trial_answer",
         places={"figures": "figures"},
+        following=f"{_ANSWERS}.control:after_test",
+        methods=(cite.EXACT_INTERVALS, cite.INTERVAL_OF_DIFFERENCE, cite.RANDOM_NUMBERS),
     ),
     RunKind(
         name="recovery",
@@ -246,6 +303,7 @@ BUILT_IN: Final = (
         page=f"{_SECTIONS}.recovery:recovery_sections",
         answer=f"{_ANSWERS}.recovery:recovery_answer",
         places={"every recording": "recovery.nc"},
+        methods=(cite.RANDOM_NUMBERS,),
     ),
     RunKind(
         name="model_comparison",
@@ -260,6 +318,7 @@ BUILT_IN: Final = (
         gives_model=True,
         answer=f"{_ANSWERS}.model_comparison:comparison_answer",
         places={"comparison": "comparison.nc", "figures": "figures"},
+        methods=(cite.KS_DISTANCE, cite.EVOLUTION_STRATEGY),
     ),
     RunKind(
         name="model_calibration",
@@ -274,6 +333,8 @@ BUILT_IN: Final = (
         gives_model=True,
         answer=f"{_ANSWERS}.calibration:model_calibration_answer",
         places={"figures": "figures"},
+        following=f"{_ANSWERS}.calibration:simulate_model",
+        methods=(cite.SYNTHETIC_LIKELIHOOD, cite.ENSEMBLE_SAMPLER, cite.SIMULATED_COVARIANCE),
     ),
     RunKind(
         name="model_recovery",
@@ -403,34 +464,31 @@ def with_source_warnings(answer: Answer, found: xr.Dataset) -> Answer:
     return answer._replace(facts={**answer.facts, "warnings": warnings}, warnings=warnings)
 
 
-def next_command(found: xr.Dataset) -> list[str]:
-    """Return the command that takes a run further, its model, and a name for its result.
+def following_of(found: xr.Dataset) -> Following:
+    """Return what comes after a run as its kind declares it; its verdict may forbid it.
 
     Parameters
     ----------
     found : xarray.Dataset
-        The main dataset of a run; nothing follows where the list is empty.
+        The main dataset of a run.
 
     Examples
     --------
     >>> import xarray as xr
-    >>> next_command(xr.Dataset(attrs={"kind": "kinetics"}))
-    []
+    >>> following_of(xr.Dataset(attrs={"kind": "control_policy"})).command
+    ('control test', 'test')
     """
-    from driftwalk.schema.answers.parts import undetermined
-    from driftwalk.schema.parameters import is_block
+    from driftwalk.schema.answers.verdict import DOES_NOT_EXPLAIN, stored_verdict
 
-    kind = kind_name(found)
-    if kind == "fit" or (kind == "calibration" and is_block(found)):
-        # Nothing can be simulated with what is not known.
-        return [] if kind == "fit" and undetermined(found) else ["assemble", "assembly"]
-    if kind == "control_policy":
-        return ["control test", "test"]
-    if kind not in ("calibration", "model_calibration"):
-        return []
-    # The user names a model that is none of driftwalk's own.
-    named = [str(found.attrs["model"])] if "model_source_sha256" in found.attrs else []
-    return ["simulate", *named, "motion.nc"]
+    verdict, kind = stored_verdict(found), kind_of(found)
+    if verdict is not None and verdict.word == DOES_NOT_EXPLAIN:
+        return Following(advice="Do not use the numbers yet: first mend what the verdict names.")
+    if kind is None or kind.following is None:
+        return Following()
+    if isinstance(kind.following, Following):
+        return kind.following
+    following: Following = load_maker(kind.following)(found)
+    return following
 
 
 def kind_of_folder(folder: Path, specification: Mapping[str, Any]) -> RunKind | None:

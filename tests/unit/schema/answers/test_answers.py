@@ -10,11 +10,10 @@ import pytest
 import xarray as xr
 from small_sensitivity import small
 
-from driftwalk.cli.assembly.assemble import assembled
 from driftwalk.cli.assembly.sensitivity import sensitivity_of
 from driftwalk.cli.terminal.output import print_parts, print_places, print_prediction, to_json
 from driftwalk.notebook.result import answer_lines
-from driftwalk.runs import AssemblyResult, SensitivityResult
+from driftwalk.runs import SensitivityResult
 from driftwalk.schema.answers.parts import Answer
 from driftwalk.schema.runs import answer_of
 
@@ -31,12 +30,11 @@ def stored(name: str) -> xr.Dataset:
 def answered(form: str) -> tuple[xr.Dataset, Answer]:
     """Return the main dataset of a run, and its answer with what else the run made."""
     if form.startswith("assembly"):
-        found, times = stored("outcome-distribution"), stored("class-times")
-        drawn = found.assign_attrs(drawn="drag_coefficient force_std")
-        result = AssemblyResult(found, found, times, drawn)
+        found = stored("outcome-distribution")
         if form == "assembly-of-many":
-            result = AssemblyResult(found, found, times, None, stored("assembly-sizes"))
-        return found, assembled(small(), result)
+            return found, of_assembly(found, sizes=stored("assembly-sizes"))
+        drawn = found.assign_attrs(drawn="drag_coefficient force_std")
+        return found, of_assembly(found, distribution_drawn=drawn)
     found = stored(form)
     if form == "sensitivity":
         reference = stored("outcome-distribution-of-realisations")
@@ -48,10 +46,17 @@ def answered(form: str) -> tuple[xr.Dataset, Answer]:
     return found, answer
 
 
+def of_assembly(found: xr.Dataset, **more: xr.Dataset) -> Answer:
+    """Return the answer of an assembly with a distribution."""
+    assembly = xr.Dataset(attrs={**found.attrs, "kind": "assembly", "study": small().to_toml()})
+    answer = answer_of(assembly, distribution=found, class_times=stored("class-times"), **more)
+    assert answer is not None
+    return answer
+
+
 def test_json_says_how_blocks_start() -> None:
     found = stored("outcome-distribution").assign_attrs(glued="xx")
-    answer = assembled(small(), AssemblyResult(found, found, stored("class-times"), None))
-    assert json.loads(to_json(answer.facts))["glued"] == "xx"
+    assert json.loads(to_json(of_assembly(found).facts))["glued"] == "xx"
 
 
 def _rounded(text: str) -> Any:

@@ -103,7 +103,7 @@ def test_a_fit_that_could_not_be_checked_says_why() -> None:
 
 @pytest.mark.slow
 def test_residuals_of_something_else_are_refused(judged: Judged) -> None:
-    with pytest.raises(InputError, match="kind 'trajectory'"):
+    with pytest.raises(InputError, match="got trajectory"):
         residuals_of(recording(SECONDS))
     with pytest.raises(InputError, match="check_model makes a"):
         residuals_of(fit_motion(recording(SECONDS), coarse_study()))
