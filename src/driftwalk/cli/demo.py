@@ -248,10 +248,8 @@ def _print_estimates(method: str, found: xr.Dataset) -> None:
         _print_row(label, f"{number.factor * truth[number.key]:.4g}", text)
 
 
-def _print_row(name: str, *cells: str) -> None:
-    widths = (9, 0)
-    line = "".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=True))
-    print(f"{name:27}{line}".rstrip())
+def _print_row(name: str, truth: str, found: str) -> None:
+    print(f"{name:27}{truth:9}{found}".rstrip())
 
 
 def _distance(facts: dict[str, Any], floor: str = "noise_floor") -> str:

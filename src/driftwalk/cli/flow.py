@@ -10,7 +10,6 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared_types import FlowVariables, FrameInterval, Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import (
     print_json,
     print_next,
@@ -192,8 +191,7 @@ def _report_file(field: xr.Dataset, out: Path, *, json: bool) -> None:
         return
     if facts["reading"]:
         print_note(f"read as {facts['reading']}")
-    for warning in facts["warnings"]:
-        print_note(f"warning: {to_options(warning)}")
+    print_warnings(facts["warnings"])
     print_note(
         f"wrote {out}: {facts['columns']} x {facts['rows']} nodes from a file, "
         f"{100 * facts['measured_share']:.0f} % of them measured, the rest filled or outside"

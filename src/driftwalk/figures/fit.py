@@ -130,7 +130,7 @@ def fit_figures(
     if "compared_law" in fit.dims:
         figures |= laws_figures(fit)
     if "force_correlation" in fit:
-        figures["stirring"] = lambda: _stirring_figure(fit)
+        figures["stirring"] = lambda: style.figure_of(plot_shared_stirring(fit))
     return figures if check is None else figures | check_figures(check)
 
 
@@ -239,31 +239,26 @@ def plot_laws(fit: xr.Dataset, ax: Axes) -> Axes:
     return ax
 
 
-def _stirring_figure(fit: xr.Dataset) -> Figure:
-    figure = style.new_figure(width_mm=style.SINGLE_COLUMN_MM, height_mm=62.0)
-    plot_shared_stirring(fit, figure.add_subplot())
-    return figure
-
-
-def plot_shared_stirring(fit: xr.Dataset, ax: Axes) -> Axes:
+def plot_shared_stirring(fit: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Plot the correlation of the forces on two bodies against their distance, with its kernel.
 
     Parameters
     ----------
     fit : xarray.Dataset
         A `fit` of free bodies in one recording.
-    ax : matplotlib.axes.Axes
-        Where to plot.
+    ax : matplotlib.axes.Axes, optional
+        Where to plot; by default the only axes of a new figure.
 
     Returns
     -------
     matplotlib.axes.Axes
-        The same axes.
+        The axes.
 
     Examples
     --------
-    ``plot_shared_stirring(fit, ax)``
+    ``plot_shared_stirring(fit)``
     """
+    ax = style.axes_or_new(ax, height_mm=62.0)
     distance = in_unit(fit["body_distance"], "cm", stored="m")
     value, ends = fit["force_correlation"].values, fit["force_correlation_interval"].values.T
     confidence = percent(fit["confidence"])

@@ -126,7 +126,7 @@ def quality_figure(calibration: xr.Dataset) -> Figure:
     held = calibration["held_out_distance"].values
     name = model_words(calibration.attrs["model"])
     aspects.plot(held, np.arange(held.size), "o", ms=3.5, color=style.BLUE, label=name)
-    plot_own_aspects(calibration, aspects, label="the recording's own parts")
+    plot_own_aspects(calibration, aspects)
     plot_check_ratios(calibration, checks, color=style.BLUE)
     label_checks(calibration, checks)
     style.letter_panels(row, ["distance from blocks not seen", NOT_FITTED])
@@ -317,7 +317,7 @@ def _plot_aspects(comparison: xr.Dataset, ax: Axes) -> None:
     for index, (one, (color, marker)) in enumerate(_first(comparison)):
         held, name = one["held_out_distance"].values, model_words(str(one["model"].values))
         ax.plot(held, place + 0.2 * (index - 1), marker, ms=3.5, color=color, label=name)
-    plot_own_aspects(comparison, ax, label="the recording's own parts")
+    plot_own_aspects(comparison, ax)
 
 
 def _plot_checks(comparison: xr.Dataset, ax: Axes) -> None:

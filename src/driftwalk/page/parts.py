@@ -193,9 +193,17 @@ def sections_of(
         "Warnings",
         lambda: warnings_section([*source_warnings(found), *warnings(found)]),
     )
-    for id, title, make in parts:
-        made += attempt(id, title, partial(make, found))
-    return made
+    return made + attempts(*((*piece, found) for piece in parts))
+
+
+def attempts(*pieces: tuple[str, str, Maker, xr.Dataset | None]) -> list[Section]:
+    """Return the sections of the datasets that there are, each as `attempt` makes it."""
+    return [
+        one
+        for id, title, make, found in pieces
+        if found is not None
+        for one in attempt(id, title, partial(make, found))
+    ]
 
 
 def summary_section(
@@ -458,6 +466,13 @@ def series(
         "name": name, "x": numbers(x), "y": numbers(y), "low": low, "high": high,
         "style": style,
     }  # fmt: skip
+
+
+def course(name: str, x: npt.ArrayLike, found: xr.Dataset, of: str, **how: Any) -> dict[str, Any]:
+    """Return a series of a variable, with its limits where the dataset holds them."""
+    low, high = (found.get(f"{of}_{end}") for end in ("low", "high"))
+    ends = None if low is None or high is None else (low.values, high.values)
+    return series(name, x, found[of].values, ends=ends, **how)
 
 
 def mark(text: str, x: Any = None, y: Any = None) -> dict[str, Any]:

@@ -17,7 +17,6 @@ from driftwalk.plot.parts.outcome_classes import (
     OTHER,
     are_discs,
     check_kind,
-    class_cells,
     class_colors,
     class_names,
     classes_to_show,
@@ -25,7 +24,7 @@ from driftwalk.plot.parts.outcome_classes import (
     name_text,
     place_sketch,
     runs_text,
-    sketch_size,
+    sketch_sizes,
     with_rest,
 )
 
@@ -230,29 +229,20 @@ def label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, st
     total_pt = float(style.axes_points(ax)[1])
     low, high = ax.get_ylim()
     share = (height - low) / (high - low)
-    known = [name != OTHER for name in names]
-    tall = np.array(
-        [
-            sketch_size(class_cells(name))[1] if there else 1.0
-            for name, there in zip(names, known, strict=True)
-        ]
-    )
+    across, tall = sketch_sizes(names).T
     free_pt = (1.0 - LABEL_GAP * len(names)) * total_pt
     # A shape of two rows is 9 pt high at most.
     cell_pt = min(4.5, free_pt / max(float(tall.sum()), 1.0))
     needed = np.maximum(tall * cell_pt, NAME_SIZE_PT) / total_pt
     place = spread_apart(share, needed + LABEL_GAP)
-    wide = max(
-        (sketch_size(class_cells(n))[0] for n, there in zip(names, known, strict=True) if there),
-        default=1.0,
-    )
+    wide = float(across.max(initial=1.0))
     leader = {"arrowstyle": "-", "lw": 0.4, "color": style.MUTED, "shrinkA": 0, "shrinkB": 0}
-    for name, there, at, end in zip(names, known, place, share, strict=True):
+    for name, at, end in zip(names, place, share, strict=True):
         ax.annotate(
             "", (1.0, end), xytext=(8.0, (at - end) * total_pt), xycoords="axes fraction",
             textcoords="offset points", annotation_clip=False, arrowprops=leader,
         )  # fmt: skip
-        if there:
+        if name != OTHER:
             place_sketch(
                 ax, name, (1.0, at), transform="axes fraction", alignment=(0.0, 0.5),
                 cell_pt=cell_pt, color=colors[name], shift_pt=(10.0, 0.0),

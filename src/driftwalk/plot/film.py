@@ -22,7 +22,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import atomic_path, require_target
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, draw_scale_bar
-from driftwalk.plot.parts.outcome_classes import empty_bars, pole_bars, poles_of
+from driftwalk.plot.parts.outcome_classes import empty_bars, poles_of, set_pole_bars
 from driftwalk.plot.parts.style import PALETTE
 from driftwalk.schema.check import require_kind
 
@@ -233,10 +233,8 @@ def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[
         bodies.set_verts(_outlines(scene, seen[until - 1][body], body, size))
         bodies.set_facecolor([PALETTE[scene.color[one] % len(PALETTE)] for one in shown])
         if scene.pole is not None:
-            poses = scene.place[until - 1], scene.theta[until - 1]
-            corners, colors = pole_bars(poses[0][:, 0], poses[0][:, 1], poses[1], scene.pole, size)
-            bars.set_verts(corners)
-            bars.set_facecolor(colors)
+            x, y = scene.place[until - 1].T
+            set_pole_bars(bars, x, y, scene.theta[until - 1], scene.pole, size)
         if count <= MOST_TRAILS:
             # NaN breaks the line.
             trails.set_segments([scene.place[first:until, body] for _, body in shown])

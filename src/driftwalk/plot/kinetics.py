@@ -71,7 +71,9 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     ``plot_class_graph(found)``
     """
     place, rows, kept, title = class_graph_of(kinetics)
-    ax = _axes_for(len(place), rows) if ax is None else ax
+    # Nine classes crowd one column of a page.
+    wide = len(place) > 6
+    ax = style.axes_or_new(ax, height_mm=max(80.0, 20.0 * rows) if wide else 90.0, wide=wide)
     ax.set_axis_off()
     ax.set_title(title, loc="left")
     style.settle_layout(ax)
@@ -173,14 +175,6 @@ def placed_arrows(
 def _rate_text(rate: float) -> str:
     """Return a rate with two digits, or all of those before the point."""
     return f"{rate:.2g}" if rate < 99.5 else f"{rate:.0f}"
-
-
-def _axes_for(classes: int, rows: int) -> Axes:
-    """Return new axes with room for each class: nine of them crowd one column of a page."""
-    if classes <= 6:
-        return style.axes_or_new(None, height_mm=90.0)
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=max(80.0, 20.0 * rows))
-    return figure.add_subplot()
 
 
 def _fill(ax: Axes, places: Floats) -> None:

@@ -308,10 +308,11 @@ def _shown(density: Floats, edge: Floats) -> tuple[float, float]:
     return float(edge[max(first - 1, 0)]), float(edge[min(last + 1, edge.size - 1)])
 
 
-def plot_own_aspects(found: xr.Dataset, ax: Axes, *, label: str) -> None:
+def plot_own_aspects(found: xr.Dataset, ax: Axes) -> None:
     """Draw how far the parts of the recording are from each other, and name the aspects."""
     aspects = [str(name) for name in found["aspect"].values]
     place = np.arange(len(aspects))
+    label = "the recording's own parts"
     ax.plot(found["own_distance"].values, place, "|", ms=9.0, mew=1.4, color=style.INK, label=label)
     ax.set_yticks(place, [ASPECT_WORDS.get(name, name) for name in aspects])
     ax.set_ylim(len(aspects) - 0.4, -0.6)

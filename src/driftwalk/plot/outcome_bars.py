@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,14 +28,6 @@ if TYPE_CHECKING:
 
 # Width of axes in one column of a page; of its 255 pt the y axis and its label take the rest.
 COLUMN_PT = 210.0
-
-
-class Bars(NamedTuple):
-    """One distribution on the classes that are drawn, shapes (shown,)."""
-
-    proportion: Floats
-    low: Floats
-    high: Floats
 
 
 def plot_outcomes(
@@ -98,7 +90,7 @@ def plot_outcomes(
         drawn.append(OTHER)
     # Twelve classes have room in one column of a page, if their names do.
     wide = len(both) > 1 or len(drawn) > 12 or not names_fit(drawn, COLUMN_PT)
-    ax = _new_axes(wide=wide) if ax is None else ax
+    ax = style.axes_or_new(ax, height_mm=76.0, wide=wide)
     place = np.arange(len(drawn), dtype=np.float64)
     width = style.BAR_WIDTH / len(both)
     for index, (dataset, color) in enumerate(zip(both, (style.BLUE, style.ORANGE), strict=False)):
@@ -122,20 +114,14 @@ def plot_outcomes(
     return ax
 
 
-def _new_axes(*, wide: bool) -> Axes:
-    figure = style.new_figure(
-        width_mm=style.DOUBLE_COLUMN_MM if wide else style.SINGLE_COLUMN_MM, height_mm=76.0
-    )
-    return figure.add_subplot()
-
-
 def _on_classes(proportion: xr.DataArray, names: list[str]) -> Floats:
     """Return shares in the order of `names`, zero for a class that the dataset lacks."""
     aligned = proportion.reindex({"class": np.array(names, dtype=object)}, fill_value=0.0)
     return np.asarray(aligned.values, dtype=np.float64)
 
 
-def _bars(dataset: xr.Dataset, names: list[str], shown: list[int]) -> Bars:
+def _bars(dataset: xr.Dataset, names: list[str], shown: list[int]) -> Floats:
+    """Return proportion, low and high of the classes that are drawn, shape (3, shown)."""
     proportion = _on_classes(dataset["proportion"], names)
     # A class that the dataset does not list has a share of 0, and no interval.
     listed = np.isin(names, class_names(dataset))
@@ -144,20 +130,21 @@ def _bars(dataset: xr.Dataset, names: list[str], shown: list[int]) -> Bars:
     )
     # The rest has no interval of its own.
     none = [np.nan] * (len(shown) < len(names))
-    return Bars(with_rest(proportion, shown), *(np.append(end[shown], none) for end in ends))
+    return np.array([with_rest(proportion, shown), *(np.append(end[shown], none) for end in ends)])
 
 
 _ENDS = ("low", "high")
 
 
-def _draw_bars(ax: Axes, at: Floats, bars: Bars, *, width: float, color: str, label: str) -> None:
-    ax.bar(at, bars.proportion, width=0.94 * width, color=color, alpha=0.75, label=label)
-    known = np.isfinite(bars.low) & np.isfinite(bars.high)
+def _draw_bars(ax: Axes, at: Floats, bars: Floats, *, width: float, color: str, label: str) -> None:
+    proportion, low, high = bars
+    ax.bar(at, proportion, width=0.94 * width, color=color, alpha=0.75, label=label)
+    known = np.isfinite(low) & np.isfinite(high)
     # A proportion lies within its interval; rounding must not make a length negative.
-    below = np.maximum(bars.proportion - bars.low, 0.0)[known]
-    above = np.maximum(bars.high - bars.proportion, 0.0)[known]
+    below = np.maximum(proportion - low, 0.0)[known]
+    above = np.maximum(high - proportion, 0.0)[known]
     ax.errorbar(
-        at[known], bars.proportion[known], yerr=[below, above], fmt="none", ecolor=style.INK,
+        at[known], proportion[known], yerr=[below, above], fmt="none", ecolor=style.INK,
         elinewidth=0.8, capsize=1.6, capthick=0.8,
     )  # fmt: skip
 

@@ -28,6 +28,7 @@ from driftwalk.plot.parts.outcome_classes import (
     place_sketch,
     reference_value,
     sketch_size,
+    sketch_sizes,
     sweep_axes,
 )
 
@@ -223,9 +224,7 @@ def plot_class_key(
     ax.set_axis_off()
     ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     columns = -(-len(names) // rows)
-    sizes = np.array(
-        [sketch_size(class_cells(name)) if is_class(name) else (1.0, 1.0) for name in names]
-    )
+    sizes = sketch_sizes(names)
     written = any(name_text(name) for name in names)
     free = style.axes_points(ax) / np.array([columns, rows])
     free -= np.array([0.0, NAME_SIZE_PT + 4.0 if written else 2.0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,8 +16,7 @@ from driftwalk.plot.parts.labels import (
     FACTORS,
     FORCE,
     LENGTH_LABEL,
-    PlotParameter,
-    drawn_anew,
+    force_interval_text,
     parameter_named,
     plot_parameters,
     require_variables,
@@ -245,15 +244,6 @@ def _checked(
     return share, length_mm, angle_deg
 
 
-class Setting(NamedTuple):
-    """One setting of the coarse map that a panel shows."""
-
-    values: dict[str, float]
-    """Its parameters by name, in the dataset's units."""
-    density: Floats
-    status: int
-
-
 def plot_density_panels(
     calibration: xr.Dataset,
     axes: Any = None,
@@ -300,10 +290,11 @@ def plot_density_panels(
 
     along = parameter_named(calibration, parameter)
     settings = choose_settings(calibration, parameter=along.name, low=low, high=high)
-    recorded = np.nan_to_num(calibration["recording_step_density"].values.astype(np.float64))
+    every = [calibration["recording_step_density"], *(one["step_density"] for one in settings)]
+    bins = ("density_step_length", "density_turning_angle")
+    densities = [np.nan_to_num(one.transpose(*bins).values.astype(np.float64)) for one in every]
     length_mm = MM_PER_M * calibration["step_length_edge"].values
     angle_deg = DEGREES * calibration["turning_angle_edge"].values
-    densities = [recorded, *(setting.density for setting in settings)]
     # One scale of colour for all panels: they are compared with each other.
     top = max(
         float(density_of(density, length_mm, angle_deg).max(initial=0.0)) for density in densities
@@ -317,10 +308,9 @@ def plot_density_panels(
         ax.set(xlabel=LENGTH_LABEL, ylabel=ANGLE_LABEL)
         ax.label_outer()
     for ax, setting in zip(row[1:], settings, strict=True):
-        _mark_cause(ax, setting)
-    style.letter_panels(
-        row, ["recording", *(along.title(setting.values[along.name]) for setting in settings)]
-    )
+        _mark_cause(ax, int(setting.get("status", 0)))
+    titles = [along.title(float(setting[along.name])) for setting in settings]
+    style.letter_panels(row, ["recording", *titles])
     if colorbar == "beside":
         style.add_colorbar(mesh, row, DENSITY_LABEL)
     heaped = []
@@ -341,7 +331,7 @@ def choose_settings(
     parameter: str,
     low: float | None = None,
     high: float | None = None,
-) -> list[Setting]:
+) -> list[xr.Dataset]:
     """Return the low, best and high setting of the coarse map nearest to the values wanted.
 
     Where the best is at an end of the map, the second is halfway to the other end.
@@ -363,17 +353,10 @@ def choose_settings(
     first, middle, last = cells.values.tolist()
     if middle in (first, last):  # an optimum at an end of the map is not shown twice
         middle = (first + last) / 2.0
-    return [_nearest(calibration, {**best, along.name: value}) for value in (first, middle, last)]
-
-
-def _nearest(calibration: xr.Dataset, values: dict[str, float]) -> Setting:
-    cell = calibration.sel(values, method="nearest")
-    density = cell["step_density"].transpose("density_step_length", "density_turning_angle")
-    return Setting(
-        values={name: float(cell[name]) for name in values},
-        density=np.nan_to_num(density.values.astype(np.float64)),
-        status=int(cell["status"]) if "status" in cell else 0,
-    )
+    return [
+        calibration.sel({**best, along.name: value}, method="nearest")
+        for value in (first, middle, last)
+    ]
 
 
 def shared_setting_text(calibration: xr.Dataset, *, parameter: str) -> str:
@@ -383,15 +366,15 @@ def shared_setting_text(calibration: xr.Dataset, *, parameter: str) -> str:
     """
     along = parameter_named(calibration, parameter)
     setting = choose_settings(calibration, parameter=along.name)[1]
-    others = [one for one in plot_parameters(calibration) if one.name != along.name]
-    words = [_with_interval(one, calibration, setting.values[one.name]) for one in others]
+    words = [
+        one.words(float(setting[one.name]))
+        + (f" ({force_interval_text(calibration)})" if one == FORCE else "")
+        for one in plot_parameters(calibration)
+        if one.name != along.name
+    ]
     if along == FORCE:
-        words.append(f"{FORCE.symbol} {drawn_anew(calibration)}")
+        words.append(f"{FORCE.symbol} {force_interval_text(calibration)}")
     return "; ".join(words)
-
-
-def _with_interval(one: PlotParameter, calibration: xr.Dataset, value: float) -> str:
-    return f"{one.words(value)} ({drawn_anew(calibration)})" if one == FORCE else one.words(value)
 
 
 def _common_limits(
@@ -408,9 +391,9 @@ def _common_limits(
     return ranges[0], ranges[1]
 
 
-def _mark_cause(ax: Axes, setting: Setting) -> None:
+def _mark_cause(ax: Axes, status: int) -> None:
     """Hatch a panel whose setting made no steps, and say why."""
-    causes = [cause for bit, cause in CAUSES.items() if setting.status & bit]
+    causes = [cause for bit, cause in CAUSES.items() if status & bit]
     if not causes:
         return
     name, hatch = causes[0]

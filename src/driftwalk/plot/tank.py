@@ -17,7 +17,7 @@ from driftwalk.plot.parts.arena import (
     draw_scale_bar,
     label_position,
 )
-from driftwalk.plot.parts.outcome_classes import empty_bars, pole_bars, poles_of
+from driftwalk.plot.parts.outcome_classes import empty_bars, poles_of, set_pole_bars
 from driftwalk.plot.parts.style import PALETTE
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.check import require_kind
@@ -292,7 +292,5 @@ def _draw_blocks(ax: Axes, moment: xr.Dataset) -> None:
         half = CM_PER_M * float(moment.attrs["block_side_m"]) / 2.0
         x, y = (CM_PER_M * moment[name].values for name in "xy")
         bars = empty_bars()
-        corners, faces = pole_bars(x, y, moment["theta"].values, pole, half)
-        bars.set_verts(corners)
-        bars.set_facecolor(faces)
+        set_pole_bars(bars, x, y, moment["theta"].values, pole, half)
         ax.add_collection(bars)

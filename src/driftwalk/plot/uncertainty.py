@@ -93,7 +93,8 @@ def plot_distance_profile(
     ``plot_distance_profile(calibration, parameter="force_std")``
     """
     along = parameter_named(calibration, parameter)
-    require_variables(calibration, "ks_distance", "ks_distance_replicate", along.name)
+    held = [f"ks_distance{of}" for of in ("", "_standard_error", "_replicate")]
+    require_variables(calibration, *held, along.name)
     best, factor = along.best(calibration), along.factor
     line = through_optimum(calibration, along)
     values = factor * np.asarray(line[along.name].values, dtype=np.float64)
@@ -108,9 +109,8 @@ def plot_distance_profile(
         np.repeat(values, replicates.shape[1]), replicates.ravel(), "o", ms=2.2, mew=0.0,
         color=style.MUTED, alpha=0.6, label="replicates",
     )  # fmt: skip
-    error = line.get("ks_distance_standard_error")
     ax.errorbar(
-        values, line["ks_distance"].values, yerr=None if error is None else error.values,
+        values, line["ks_distance"].values, yerr=line["ks_distance_standard_error"].values,
         color=style.BLUE, lw=1.0, elinewidth=0.8, label="mean ± standard error",
     )  # fmt: skip
     if len(plot_parameters(calibration)) == 1 and "refined_surface" in calibration:
@@ -214,10 +214,6 @@ def through_optimum(calibration: xr.Dataset, along: PlotParameter) -> xr.Dataset
     """Return the line of the coarse map next to the optimum in the other parameters."""
     others = [one for one in plot_parameters(calibration) if one.name != along.name]
     best = {one.name: one.best(calibration) / one.factor for one in others}
-    wanted = [
-        name
-        for name in ("ks_distance", "ks_distance_standard_error", "ks_distance_replicate")
-        if name in calibration
-    ]
+    wanted = ["ks_distance", "ks_distance_standard_error", "ks_distance_replicate"]
     line: xr.Dataset = calibration[wanted].sel(best, method="nearest")
     return line

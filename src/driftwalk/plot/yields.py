@@ -105,14 +105,10 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     order = np.argsort(behind + (found["standing"].values == "worse"), kind="stable")
     order = order[:MOST_SETTINGS]
     words, shared = _setting_labels(found, order)
-    if ax is None:
-        # Twenty letters leave half of one column of a page to the points; 6 mm for a setting, 32 mm
-        # for legend and axis.
-        wide = max(map(len, words)) > 20
-        ax = style.new_figure(
-            width_mm=style.DOUBLE_COLUMN_MM if wide else style.SINGLE_COLUMN_MM,
-            height_mm=6.0 * len(order) + 32.0,
-        ).add_subplot()
+    # Twenty letters leave half of one column of a page to the points; 6 mm for a setting, 32 mm for
+    # legend and axis.
+    wide = max(map(len, words)) > 20
+    ax = style.axes_or_new(ax, height_mm=6.0 * len(order) + 32.0, wide=wide)
     for row, at in enumerate(order):
         one = found.isel(setting=at)
         reach = [

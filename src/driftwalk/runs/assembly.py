@@ -120,12 +120,13 @@ class AssemblyWork:
         found = self.calibration
         source = "" if found is None else drawn_from(found)
         drawn_names = COVARIANCE if source == "covariance" else REGION
+        drawn = {key: values.tolist() for key, values in self.quantiles.items()}
         names = ("u", "v", *(f"{part}_standard_error" for part in "uv"))
         return {
             "study": self.study.to_dict(),
             "flow_sha256": dataset_hash(self.flow, tuple(n for n in names if n in self.flow)),
             "calibration_sha256": dataset_hash(found, drawn_names),
-            **({"quantiles": drawn} if (drawn := _lists(self.quantiles)) else {}),
+            **({"quantiles": drawn} if drawn else {}),
             **table_hash(self.study),
         }
 
@@ -232,10 +233,6 @@ def table_hash(study: Study) -> dict[str, str]:
     if table is None:
         return {}
     return {"attraction_sha256": sha256(Path(table).read_bytes()).hexdigest()}
-
-
-def _lists(quantiles: Mapping[str, Floats]) -> dict[str, list[float]]:
-    return {key: values.tolist() for key, values in quantiles.items()}
 
 
 @dataclass(frozen=True)

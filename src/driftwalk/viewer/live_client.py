@@ -42,19 +42,6 @@ Fault = str | None
 Check = Callable[[Any], Fault]
 
 
-class _Tally:
-    """How many of a kind were left out, of how many frames, and why."""
-
-    def __init__(self) -> None:
-        self.parts, self.frames = 0, 0
-        self.reasons: Counter[str] = Counter()
-
-    def add(self, reasons: list[str]) -> None:
-        self.parts += len(reasons)
-        self.frames += 1
-        self.reasons.update(reasons)
-
-
 class SoundFrames:
     """Takes the frames of one stream and leaves out what cannot be drawn.
 
@@ -71,8 +58,8 @@ class SoundFrames:
     """
 
     def __init__(self) -> None:
-        self._tallies = {kind: _Tally() for kind in KINDS}
-        self._known: set[tuple[str, str]] = set()
+        self._reasons: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
+        self._frames: Counter[str] = Counter()
         self._said = ""
         self._next = -math.inf
 
@@ -113,8 +100,8 @@ class SoundFrames:
         """
         if now < self._next and not last:
             return None
-        found = [_sentence(kind, tally) for kind, tally in self._tallies.items() if tally.parts]
-        words = "; ".join(found)
+        told = {kind: reasons for kind, reasons in self._reasons.items() if reasons}
+        words = "; ".join(_sentence(*one, self._frames[one[0]]) for one in told.items())
         if words == self._said:
             return None
         self._said, self._next = words, now + SAID_EVERY_S
@@ -142,20 +129,21 @@ class SoundFrames:
     def _note(self, kind: str, reasons: list[str]) -> None:
         if not reasons:
             return
-        self._tallies[kind].add(reasons)
-        new = {(kind, reason) for reason in reasons} - self._known
-        if new:
-            self._known |= new
+        known = self._reasons[kind]
+        if not known.keys() >= {*reasons}:
             self._next = -math.inf
+        known.update(reasons)
+        self._frames[kind] += 1
 
 
-def _sentence(kind: str, tally: _Tally) -> str:
+def _sentence(kind: str, reasons: Counter[str], frames: int) -> str:
     one, several = KINDS[kind]
-    named = [reason for reason, _ in tally.reasons.most_common(MOST_REASONS)]
-    more = ["..."] if len(tally.reasons) > MOST_REASONS else []
-    what = f"{tally.parts} {several if tally.parts > 1 else one}"
+    named = [reason for reason, _ in reasons.most_common(MOST_REASONS)]
+    more = ["..."] if len(reasons) > MOST_REASONS else []
+    parts = reasons.total()
+    what = f"{parts} {several if parts > 1 else one}"
     if kind not in ("line", "frame"):
-        what += f" of {tally.frames} frame{'s' if tally.frames > 1 else ''}"
+        what += f" of {frames} frame{'s' if frames > 1 else ''}"
     return f"{what} ({', '.join(named + more)})"
 
 

@@ -15,7 +15,9 @@ from every_kind import every_kind
 import driftwalk as dw
 from driftwalk.cli.assembly.yields import _again
 from driftwalk.core.files.shards import ShardStore
+from driftwalk.page import dataset_page
 from driftwalk.schema.answers.yields import more_runs
+from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 from driftwalk.viewer.watch.run_page import RunSource
 
 pytestmark = pytest.mark.slow
@@ -43,6 +45,15 @@ def test_a_run_holds_its_answer_and_its_figures(tmp_path: Path) -> None:
     assert again["reached"].equals(found["reached"])
     assert "best setting" in repr(again)
     assert here("report", out, "-o", tmp_path / "page.html").code == 0
+
+
+def test_a_setting_in_words_of_a_file_has_no_chart_along_it(tmp_path: Path) -> None:
+    file = tmp_path / "yields.nc"
+    file.write_bytes(netcdf_bytes(every_kind("yield")))
+    page = dataset_page(open_netcdf(file))
+    ids = [section["id"] for section in page["sections"]]
+    assert "along-force_std" in ids
+    assert not {"along", "along-latching"} & {*ids}
 
 
 def test_the_next_command_has_the_runs_that_distinguish() -> None:

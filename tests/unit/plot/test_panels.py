@@ -26,16 +26,16 @@ def _mesh(ax) -> QuadMesh:
 def test_settings_are_the_nearest_of_the_grid(calibration) -> None:
     # Optimum 0.39 and 0.61 mN on grids of 0.1 and 0.125 mN.
     settings = choose_settings(calibration, parameter="drag_coefficient")
-    assert [s.values["drag_coefficient"] for s in settings] == pytest.approx([0.1, 0.4, 0.7])
-    assert [s.values["force_std"] for s in settings] == pytest.approx([0.625e-3] * 3)
+    assert [float(s["drag_coefficient"]) for s in settings] == pytest.approx([0.1, 0.4, 0.7])
+    assert [float(s["force_std"]) for s in settings] == pytest.approx([0.625e-3] * 3)
     settings = choose_settings(calibration, parameter="force_std", low=0.0, high=1e-3)
-    assert [s.values["force_std"] for s in settings] == pytest.approx([0.0, 0.625e-3, 1e-3])
-    assert [s.values["drag_coefficient"] for s in settings] == pytest.approx([0.4] * 3)
+    assert [float(s["force_std"]) for s in settings] == pytest.approx([0.0, 0.625e-3, 1e-3])
+    assert [float(s["drag_coefficient"]) for s in settings] == pytest.approx([0.4] * 3)
 
 
 def test_an_optimum_at_an_end_of_the_map_is_shown_once(calibration) -> None:
     settings = choose_settings(calibration, parameter="drag_coefficient", low=0.4, high=0.8)
-    assert [s.values["drag_coefficient"] for s in settings] == pytest.approx([0.4, 0.6, 0.8])
+    assert [float(s["drag_coefficient"]) for s in settings] == pytest.approx([0.4, 0.6, 0.8])
 
 
 @pytest.mark.slow

@@ -40,7 +40,7 @@ def read_flow_file(
     InputError
         When the field cannot be read, or ``--frame-interval`` is given for a recording.
     """
-    from driftwalk.flow import flow_format
+    from driftwalk.flow import flow_format, load_flow
 
     columns = parse_pairs(how.columns or [], "--columns")
     velocities = bool({"u", "v"} & set(columns))
@@ -53,18 +53,6 @@ def read_flow_file(
                 "--columns x=NAME,y=NAME,u=NAME,v=NAME makes it a flow field"
             )
         return None
-    return _load(path, how, frame_interval, variables, columns)
-
-
-def _load(
-    path: Path,
-    how: RecordingOptions,
-    frame_interval: float | None,
-    variables: str | None,
-    columns: dict[str, str],
-) -> xr.Dataset:
-    from driftwalk.flow import load_flow
-
     values: dict[str, Any] = {
         "metres_per_pixel": how.scale,
         "frame_interval": frame_interval,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -226,26 +225,9 @@ MEANING: Final = {
 }
 
 
-@dataclass(frozen=True)
-class Exported:
-    """One world in one format.
-
-    Attributes
-    ----------
-    file : Path
-        The file or folder.
-    lost : sequence of str
-        What it does not hold, in sentences.
-    call : str
-        How driftwalk reads it again; ``""`` where it does not.
-    """
-
-    file: Path
-    lost: Sequence[str]
-    call: str
-
-
-def write_readme(folder: Path, format: str, source: str, exported: Sequence[Exported]) -> Path:
+def write_readme(
+    folder: Path, format: str, source: str, exported: Sequence[tuple[Path, Sequence[str], str]]
+) -> Path:
     """Write ``README.md`` next to the files.
 
     Parameters
@@ -256,8 +238,9 @@ def write_readme(folder: Path, format: str, source: str, exported: Sequence[Expo
         Their format.
     source : str
         What they were made of.
-    exported : sequence of Exported
-        The files.
+    exported : sequence of tuple
+        Each file or folder, what it does not hold, in sentences, and how driftwalk reads it again;
+        ``""`` where it does not.
 
     Returns
     -------
@@ -273,12 +256,12 @@ def write_readme(folder: Path, format: str, source: str, exported: Sequence[Expo
 
     lines = [f"# Motion from {source}", "", f"driftwalk {__version__} wrote these files.", ""]
     lines += [MEANING[format], ""]
-    for one in exported:
-        lines += [f"## {one.file.name}", ""]
-        if one.call:
-            lines += [f"driftwalk reads it again: `{one.call}`", ""]
-        if one.lost:
-            lines += ["The file does not hold:", "", *(f"- {what}" for what in one.lost), ""]
+    for file, absent, call in exported:
+        lines += [f"## {file.name}", ""]
+        if call:
+            lines += [f"driftwalk reads it again: `{call}`", ""]
+        if absent:
+            lines += ["The file does not hold:", "", *(f"- {what}" for what in absent), ""]
     target = folder / README
     write_atomic(target, "\n".join(lines).encode())
     return target
@@ -295,12 +278,12 @@ WRITERS: Final[dict[str, tuple[Callable[[Motion, Path], list[Path]], str]]] = {
 def _write_motions(format: str, source: Source, folder: Path) -> list[Path]:
     write = WRITERS[format][0]
     files: list[Path] = []
-    pages: list[Exported] = []
+    pages: list[tuple[Path, list[str], str]] = []
     missing: dict[str, None] = {}
     for motion in find_motions(source.path, replicate=source.replicate):
         file, *further = write(motion, folder)
         sentences = lost(format, motion)
-        pages.append(Exported(file, sentences, read_again(format, motion, file)))
+        pages.append((file, sentences, read_again(format, motion, file)))
         files += [file, *further]
         missing |= dict.fromkeys(sentences)
         if format != "movement":
@@ -325,7 +308,7 @@ def _write_films(ending: str, source: Source, folder: Path) -> list[Path]:
         speed=1.0 if source.speed is None else source.speed,
         progress=source.progress,
     )
-    page = write_readme(folder, "film", text_of_name(source.path), [Exported(file, [], "")])
+    page = write_readme(folder, "film", text_of_name(source.path), [(file, [], "")])
     return [file, page]
 
 

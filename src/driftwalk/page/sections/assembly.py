@@ -5,6 +5,7 @@ Where bonds break: shares of time, rates and lifetimes of the classes.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -91,25 +92,15 @@ def assembly_sections(
         made += parts.attempt("classes", "Structures built", lambda: classes_section(outcomes))
     if sizes is not None:
         made += size_sections(_by_set(sizes, sizes_drawn))
-    if class_times is not None:
-        if sizes is None:
-            title = "Outcome classes over time"
-            made += parts.attempt("class-times", title, lambda: class_times_section(class_times))
-        title = "Time to contact and completion"
-        made += parts.attempt("survival", title, lambda: survival_section(class_times))
-    if steady_state is not None:
-        title = "Steady state"
-        made += parts.attempt("steady-state", title, lambda: steady_sections(steady_state))
-    if attraction is not None:
-        title = "Force between two blocks"
-        made += parts.attempt("attraction", title, lambda: attraction_section(attraction))
-    if path is not None:
-        made += parts.attempt("replay", "Sample runs", lambda: replay_section(path, assembly))
-    if assembly_drawn is not None:
-        made += parts.attempt(
-            "drawn", "The drawn parameters", lambda: drawn_section(assembly_drawn)
-        )
-    return made
+    shares = class_times if sizes is None else None
+    return made + parts.attempts(
+        ("class-times", "Outcome classes over time", class_times_section, shares),
+        ("survival", "Time to contact and completion", survival_section, class_times),
+        ("steady-state", "Steady state", steady_sections, steady_state),
+        ("attraction", "Force between two blocks", attraction_section, attraction),
+        ("replay", "Sample runs", partial(replay_section, assembly=assembly), path),
+        ("drawn", "The drawn parameters", drawn_section, assembly_drawn),
+    )
 
 
 def _by_set(found: xr.Dataset | None, drawn: xr.Dataset | None) -> dict[str, xr.Dataset]:
@@ -163,12 +154,8 @@ def assembly_summary(
 def survival_section(times: xr.Dataset) -> Section:
     """Return the shares of runs without contact yet, and without completion yet."""
     require(times, "time", *SURVIVAL)
-    drawn: list[dict[str, Any]] = []
-    for name, words in SURVIVAL.items():
-        ends = [f"{name}_{end}" for end in ("low", "high")]
-        known = all(end in times for end in ends)
-        band = (times[ends[0]].values, times[ends[1]].values) if known else None
-        drawn.append(parts.series(words, times["time"].values, times[name].values, ends=band))
+    time = times["time"].values
+    drawn = [parts.course(words, time, times, name) for name, words in SURVIVAL.items()]
     return parts.chart(
         "survival", "Time to contact and completion",
         x=parts.label("time", "s"), y=parts.label("share of runs"), series=drawn,
@@ -320,11 +307,8 @@ def steady_sections(steady: xr.Dataset) -> list[Section]:
     for place in np.argsort(-time, kind="stable")[:MOST_CURVES].tolist():
         if time[place] > 0:
             one = steady.isel({"class": place})
-            ends = (one["survival_low"].values, one["survival_high"].values)
             name = short_class(str(one["class"].values))
-            drawn.append(
-                parts.series(name, steady["age"].values, one["survival"].values, ends=ends)
-            )
+            drawn.append(parts.course(name, steady["age"].values, one, "survival"))
     return [
         parts.section_of_table("steady-state", "Steady state", table, note),
         parts.chart(

@@ -23,7 +23,7 @@ from driftwalk.page.parts import (
 from driftwalk.page.sections.flow import flow_sections
 from driftwalk.page.sections.map import (
     FORCE,
-    PageParameter,
+    axis_of,
     map_section,
     page_parameters,
     region_part,
@@ -34,6 +34,7 @@ from driftwalk.schema.answers.calibration import UNCHECKED
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.parts import estimates
 from driftwalk.schema.answers.verdict import stored_verdict
+from driftwalk.schema.description import Number
 from driftwalk.schema.parameters import is_block
 
 if TYPE_CHECKING:
@@ -88,9 +89,7 @@ def calibration_sections(
     if len(page_parameters(calibration)) != 1:
         one = one_body(recording, body)
         pieces.insert(0, ("map", "The map", lambda found: map_section(found, one)))
-    for id, title, make in pieces:
-        made += parts.attempt(id, title, partial(make, calibration))
-    return made
+    return made + parts.attempts(*((*piece, calibration) for piece in pieces))
 
 
 def calibration_summary(calibration: xr.Dataset) -> Section:
@@ -176,12 +175,12 @@ def bootstrap_section(calibration: xr.Dataset) -> Section:
         ends = interval_of(calibration, f"{parameters[0].key}_interval") or ()
         marks += [parts.mark("end of the interval", end) for end in ends]
     else:
-        y = parameters[1].axis(calibration)
+        y = axis_of(calibration, parameters[1])
         drawn = [parts.series(name, estimates[0], estimates[1], style="points")]
         region = region_part(calibration)
         if region is not None:
             drawn.append(parts.series("joint region", *([*region[n], region[n][0]] for n in "xy")))
-    x = parameters[0].axis(calibration)
+    x = axis_of(calibration, parameters[0])
     return parts.chart("bootstrap", title, note, x=x, y=y, series=drawn, marks=marks)
 
 
@@ -208,9 +207,9 @@ def validation_section(calibration: xr.Dataset) -> Section:
     return parts.table_section("validation", title, ["", "value"], rows)
 
 
-def _with_unit(one: PageParameter) -> str:
+def _with_unit(one: Number) -> str:
     unit = "mN" if one == FORCE else one.unit
-    return one.short_symbol if unit == "1" else f"{one.short_symbol} ({unit})"
+    return one.short if unit == "1" else f"{one.short} ({unit})"
 
 
 def _what_was_done(calibration: xr.Dataset) -> str:
@@ -222,7 +221,9 @@ def _what_was_done(calibration: xr.Dataset) -> str:
         each = "" if step is None else f" of {quantity(step, 's')}"
         words += f" ({quantity(duration, 's')}, {count(int(pairs), 'pair')} of steps{each})"
     settings = calibration["ks_distance"].size
-    searched = " and ".join(one.short for one in page_parameters(calibration))
+    searched = " and ".join(one.plain for one in page_parameters(calibration))
+    if is_block(calibration):
+        searched = "drag and stochastic force"
     words += f" with simulations of {settings} settings of {searched}"
     if "replicate" in calibration.sizes:
         words += f", {_runs_each(calibration)} each"
@@ -253,7 +254,7 @@ def _what_was_found(calibration: xr.Dataset) -> str:
         for one in parameters
     ]
     if FORCE not in parameters:
-        words = [f"{one.label} = {value}" for one, value in zip(parameters, found, strict=True)]
+        words = [f"{one.plain} = {value}" for one, value in zip(parameters, found, strict=True)]
         return f"The best agreement is at {' and '.join(words)}."
     drag, force = found
     every = quantity(required(calibration, "force_interval_s"), "s")
@@ -293,14 +294,11 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
     ]
 
 
-def _profile(calibration: xr.Dataset, along: PageParameter) -> Section:
+def _profile(calibration: xr.Dataset, along: Number) -> Section:
     others = [one for one in page_parameters(calibration) if one.name != along.name]
     best = {other.name: float(required(calibration, other.key)) for other in others}
     line = calibration.sel(best, method="nearest")
-    fixed = [
-        f"{other.short_symbol} = {quantity(float(line[other.name]), other.unit)}"
-        for other in others
-    ]
+    fixed = [f"{other.short} = {quantity(float(line[other.name]), other.unit)}" for other in others]
     marks = [
         parts.mark(
             "optimum", value_of(calibration, along.key), value_of(calibration, "ks_distance")
@@ -318,9 +316,9 @@ def _profile(calibration: xr.Dataset, along: PageParameter) -> Section:
         )
     return parts.chart(
         f"profile-{along.name.replace('_', '-')}",
-        f"Distance along the {along.label}",
+        f"Distance along the {along.plain}",
         where if fixed else "Every setting that was simulated.",
-        x=along.axis(calibration),
+        x=axis_of(calibration, along),
         y=parts.label("KS distance D", log=True),
         series=drawn,
         marks=marks,

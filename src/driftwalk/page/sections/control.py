@@ -116,9 +116,7 @@ def trial_sections(
     ]
     nothing = "There is no test yet."
     made = parts.sections_of(control_test, nothing, trial_summary, lambda _: [], pieces)
-    if path is not None:
-        made += parts.attempt("replay", "The run", lambda: replay_section(path))
-    return made
+    return made + parts.attempts(("replay", "The run", replay_section, path))
 
 
 def trial_summary(test: xr.Dataset) -> Section:

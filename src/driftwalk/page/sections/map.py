@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,65 +16,31 @@ from driftwalk.plot.distances import CAUSES, UNKNOWN_CAUSE
 from driftwalk.plot.parts.labels import force_interval_text
 from driftwalk.schema import body_track
 from driftwalk.schema.answers.facts import facts_of
+from driftwalk.schema.description import Number
+from driftwalk.schema.kinds.fit import PARAMETERS
 from driftwalk.schema.parameters import BLOCK, is_block, stored_parameters
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-class PageParameter(NamedTuple):
-    """A parameter as a page names it."""
-
-    name: str
-    """Dimension of the dataset."""
-    key: str
-    """Flat name of its estimate."""
-    unit: str
-    label: str
-    symbol: str
-    """Symbol in formulas; empty for a model of the user."""
-    scale: str
-    short: str
-    """Name in a sentence on the search."""
-
-    @property
-    def words(self) -> str:
-        """Label and symbol: "drag coefficient C_d"."""
-        return f"{self.label} {self.symbol}".rstrip()
-
-    @property
-    def short_symbol(self) -> str:
-        """The symbol, or the label where there is none."""
-        return self.symbol or self.label
-
-    def axis(self, dataset: xr.Dataset, prefix: str = "") -> dict[str, Any]:
-        """Return the axis of a map or a chart; the force means nothing without its interval."""
-        every = ""
-        if self.symbol == FORCE.symbol and "force_interval_s" in facts_of(dataset):
-            every = f", {force_interval_text(dataset)}"
-        words = f"{self.words}{every}"
-        found = parts.axis(self.name, words, self.unit, dataset[f"{prefix}{self.name}"].values)
-        if self.scale == "log":
-            found |= {"log": parts.label(words, self.unit, log=True)["log"]}
-        return found
+DRAG, FORCE = (PARAMETERS[name] for name in BLOCK)
 
 
-DRAG = PageParameter(BLOCK[0], "drag_coefficient", "1", "drag coefficient", "C_d", "linear", "drag")
-"""The drag of the block: column of a map, key, unit, label, symbol, scale and short name."""
-FORCE = PageParameter(
-    BLOCK[1], "force_std_N", "N", "stochastic force", "σ_F", "linear", "stochastic force"
-)
-"""The same of the stochastic force."""
-
-
-def page_parameters(calibration: xr.Dataset) -> tuple[PageParameter, ...]:
+def page_parameters(calibration: xr.Dataset) -> tuple[Number, ...]:
     """Return the parameters of a calibration, in the order of its dimensions."""
     if is_block(calibration):
         return DRAG, FORCE
-    return tuple(
-        PageParameter(one.name, one.key, one.unit, one.label, "", one.scale, one.label)
-        for one in stored_parameters(calibration)
-    )
+    return tuple(Number(one.name, one.unit, one.label) for one in stored_parameters(calibration))
+
+
+def axis_of(calibration: xr.Dataset, one: Number) -> dict[str, Any]:
+    """Return the axis of a map or a chart; the force means nothing without its interval."""
+    words, values = one.words, calibration[one.name]
+    if one == FORCE and "force_interval_s" in facts_of(calibration):
+        words += f", {force_interval_text(calibration)}"
+    found = parts.axis(one.name, words, one.unit, values.values)
+    return found | ({"log": True} if values.attrs.get("scale") == "log" else {})
 
 
 def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) -> Section:
@@ -110,8 +76,8 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
     cells = _cells(calibration)
     return parts.section(
         "map", "map", "How well each setting explains the recording", _note(calibration, cells),
-        x=across.axis(calibration),
-        y=up.axis(calibration),
+        x=axis_of(calibration, across),
+        y=axis_of(calibration, up),
         value=encode_array(distance),
         standard_error=encode_array(_plane(calibration, "ks_distance_standard_error"))
         if "ks_distance_standard_error" in calibration
@@ -130,7 +96,7 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
     )  # fmt: skip
 
 
-def plane_of(calibration: xr.Dataset) -> tuple[PageParameter, PageParameter]:
+def plane_of(calibration: xr.Dataset) -> tuple[Number, Number]:
     """Return the parameters along y (the rows) and x (the columns) of every map of a calibration.
 
     Raises

@@ -210,7 +210,7 @@ def sizes_section(found: dict[str, xr.Dataset]) -> Section:
         ends = zip(one["size"].values, one["size_to"].values, strict=True)
         groups |= dict.fromkeys(f"{low} to {high}" for low, high in ends if high > low)
         middle = np.sqrt(one["size"].values * one["size_to"].values)
-        drawn.append(_series(name, middle, one, "block_share", style="points"))
+        drawn.append(parts.course(name, middle, one, "block_share", style="points"))
     grouped = "Sizes that share a point, at their geometric mean"
     note = f"{grouped}: {', '.join(groups)}. " if groups else ""
     return parts.chart(
@@ -246,13 +246,8 @@ def _courses(found: dict[str, xr.Dataset], names: dict[str, str]) -> list[dict[s
         for name, words in names.items():
             both = (words, kind if len(found) > 1 or not words else "")
             text = ", ".join(part for part in both if part)
-            drawn.append(_series(text, one["time"].values, one, name))
+            drawn.append(parts.course(text, one["time"].values, one, name))
     return drawn
-
-
-def _series(name: str, x: Any, found: xr.Dataset, of: str, **how: Any) -> dict[str, Any]:
-    ends = (found[f"{of}_low"].values, found[f"{of}_high"].values)
-    return parts.series(name, x, found[of].values, ends=ends, **how)
 
 
 def _note(found: dict[str, xr.Dataset]) -> str:

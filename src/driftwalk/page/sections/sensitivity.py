@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from driftwalk.core.errors import InputError
 from driftwalk.page import parts
 from driftwalk.page.arrays import number, numbers
 from driftwalk.page.parts import Section, count, quantity, require, value_of
@@ -77,16 +79,10 @@ def sensitivity_sections(
         made += parts.attempt(
             id, title, lambda: classes_section({"reference": reference}, id=id, title=title)
         )
-    if components is not None and sensitivity is not None:
-        made += parts.attempt(
-            "biplot", "Principal components", lambda: biplot_section(components, sensitivity)
-        )
-    elif sensitivity is not None:
-        reason = "They need two settings with different outcomes."
-        made.append(parts.empty_section("biplot", "Principal components", reason))
-    if sobol is not None:
-        made += parts.attempt("sobol", "Sobol' indices", lambda: sobol_section(sobol))
-    return made
+    return made + parts.attempts(
+        ("biplot", "Principal components", partial(biplot_section, components), sensitivity),
+        ("sobol", "Sobol' indices", sobol_section, sobol),
+    )
 
 
 def sensitivity_summary(sensitivity: xr.Dataset, reference: xr.Dataset | None) -> Section:
@@ -140,8 +136,10 @@ def _warnings(sensitivity: xr.Dataset) -> list[str]:
     return said
 
 
-def biplot_section(components: xr.Dataset, sensitivity: xr.Dataset) -> Section:
+def biplot_section(components: xr.Dataset | None, sensitivity: xr.Dataset) -> Section:
     """Return the settings on their first two principal components, the classes as arrows."""
+    if components is None:
+        raise InputError("They need two settings with different outcomes.")
     require_axes(sensitivity)
     found = biplot_of(components)
     dims = [str(dim) for dim in components["score"].dims if dim != "component"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -20,7 +19,7 @@ from driftwalk.plot.parts.outcome_classes import (
     classes_to_show,
     with_rest,
 )
-from driftwalk.schema.kinds.sensitivity import AXIS_NUMBERS, axis_number
+from driftwalk.schema.kinds.sensitivity import axis_number, ranked_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,18 +43,6 @@ def map_axes(part: xr.Dataset) -> tuple[str, str | None]:
     """Return which axis is x and which is y."""
     ranked = ranked_axes([str(dim) for dim in part["l1_distance"].dims])
     return ranked[0], ranked[1] if len(ranked) > 1 else None
-
-
-def ranked_axes(names: Sequence[str]) -> list[str]:
-    """Return axes in the order from x to y: the drag lies along x, as in the figures of a run.
-
-    Examples
-    --------
-    >>> ranked_axes(["latching", "force_std", "drag_coefficient"])
-    ['drag_coefficient', 'force_std', 'latching']
-    """
-    order = [*AXIS_NUMBERS]
-    return sorted(names, key=lambda name: order.index(name) if name in order else len(order))
 
 
 def is_words(part: xr.Dataset, name: str) -> bool:

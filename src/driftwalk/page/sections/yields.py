@@ -9,6 +9,7 @@ import numpy as np
 from driftwalk.core.units import in_percent, percent
 from driftwalk.page import parts
 from driftwalk.page.parts import Maker, Section, require, required
+from driftwalk.page.sections.sensitivity_maps import is_words
 from driftwalk.schema.answers.yields import (
     front_table,
     setting_table,
@@ -82,10 +83,7 @@ def front_section(yields: xr.Dataset) -> Section:
     """Return the largest yield over time, and the curves of some settings."""
     require(yields, "time", "share", "front_yield", "front_yield_low", "front_yield_high")
     time = yields["time"].values
-    ends = (yields["front_yield_low"].values, yields["front_yield_high"].values)
-    drawn = [
-        parts.series("best setting of each time", time, yields["front_yield"].values, ends=ends)
-    ]
+    drawn = [parts.course("best setting of each time", time, yields, "front_yield")]
     fresh = np.flatnonzero(yields["fresh_runs"].values > 0)
     order = fresh[np.argsort(-yields["fresh_yield"].values[fresh], kind="stable")]
     drawn += [
@@ -107,7 +105,7 @@ def along_sections(yields: xr.Dataset) -> list[Section]:
     found = []
     for name in varied(yields):
         values = yields[name].values
-        if values.dtype == object or len(set(values.tolist())) < 2:
+        if is_words(yields, name) or len(set(values.tolist())) < 2:
             continue
         drawn = []
         for word in ("worse", "alike", "best"):

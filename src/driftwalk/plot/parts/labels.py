@@ -264,10 +264,3 @@ def plane_of(calibration: xr.Dataset) -> tuple[PlotParameter, PlotParameter]:
             "map shows two: plot_distance_profile draws the distance along one"
         )
     return found[0], found[1]
-
-
-def drawn_anew(calibration: xr.Dataset) -> str:
-    """Return "redrawn every 16 ms" for the block's force, "" for other models."""
-    if not np.isfinite(number_fact(calibration, "force_interval_s")):
-        return ""
-    return force_interval_text(calibration)

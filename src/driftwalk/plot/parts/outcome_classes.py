@@ -14,7 +14,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.labels import force_label, in_unit, number_label
 from driftwalk.plot.parts.style import BLUE, FONT_PT, INK, PALETTE, axes_points
 from driftwalk.schema.check import require_kind
-from driftwalk.schema.kinds.sensitivity import AXIS_NUMBERS, axis_number
+from driftwalk.schema.kinds.sensitivity import axis_number, ranked_axes
 from driftwalk.schema.shapes import (
     NAMED_SHAPES,
     cells_of_shape,
@@ -143,9 +143,7 @@ def sweep_axes(variable: xr.DataArray, dataset: xr.Dataset) -> list[SweepAxis]:
         The study, for its coordinates and the interval of the force.
     """
     names = [str(dim) for dim in variable.dims if dim not in ("class", "component")]
-    order = [*AXIS_NUMBERS]
-    known = sorted((name for name in names if name in order), key=order.index)
-    return [_sweep_axis(name, dataset) for name in [*known, *(n for n in names if n not in order)]]
+    return [_sweep_axis(name, dataset) for name in ranked_axes(names)]
 
 
 def reference_value(dataset: xr.Dataset, axis: SweepAxis) -> float:
@@ -328,6 +326,12 @@ def sketch_size(cells: Floats) -> Floats:
     """Return width and height of a sketch, in sides of a block."""
     size: Floats = cells.max(axis=0) + 1.0
     return size
+
+
+def sketch_sizes(names: Sequence[str]) -> Floats:
+    """Return the size of each sketch, and of what is no class that of one cell."""
+    sizes = [sketch_size(class_cells(name)) if is_class(name) else (1.0, 1.0) for name in names]
+    return np.array(sizes).reshape(-1, 2)
 
 
 def sketch_box(
@@ -645,13 +649,15 @@ class PoleBarPolicy(NamedTuple):
 POLE_BAR: Final = PoleBarPolicy()
 
 
-def pole_bars(
-    x: Floats, y: Floats, theta: Floats, pole: Any, half_side: float
-) -> tuple[list[Floats], list[str]]:
-    """Return the corners and the colours of the bars of some blocks.
+def set_pole_bars(
+    bars: PolyCollection, x: Floats, y: Floats, theta: Floats, pole: Any, half_side: float
+) -> None:
+    """Give corners and colours of the bars of some blocks to a collection.
 
     Parameters
     ----------
+    bars : matplotlib.collections.PolyCollection
+        As `empty_bars` makes it.
     x, y, theta : ndarray, shape (block,)
         Poses; angles in rad.
     pole : array_like of int, shape (block, 4)
@@ -674,7 +680,8 @@ def pole_bars(
         turned = own @ np.array([[cosine, sine], [-sine, cosine]])
         corners.append(turned + np.array([x[block], y[block]]))
         colors.append(POLE_COLORS[int(pole[block][face])])
-    return corners, colors
+    bars.set_verts(corners)
+    bars.set_facecolor(colors)
 
 
 def empty_bars() -> PolyCollection:

@@ -143,13 +143,17 @@ def new_panels(
 
 
 def axes_or_new(
-    ax: Axes | None, *, height_mm: float = 75.0, layout: Layout = "constrained"
+    ax: Axes | None,
+    *,
+    height_mm: float = 75.0,
+    wide: bool = False,
+    layout: Layout = "constrained",
 ) -> Axes:
-    """Return `ax`, or when it is None the only axes of a new figure one column wide."""
+    """Return `ax`, or when it is None the only axes of a new figure, one column wide or two."""
     if ax is not None:
         return ax
-    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=height_mm, layout=layout)
-    return figure.add_subplot()
+    width_mm = DOUBLE_COLUMN_MM if wide else SINGLE_COLUMN_MM
+    return new_figure(width_mm=width_mm, height_mm=height_mm, layout=layout).add_subplot()
 
 
 def axes_grid_or_new(

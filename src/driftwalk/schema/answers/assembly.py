@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.units import in_percent
-from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each
+from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each, interval_cells
 from driftwalk.schema.kinds.flow import flow_series_words
 from driftwalk.schema.shapes import short_class
 
@@ -169,9 +169,7 @@ def _json(found: xr.Dataset, sizes: xr.Dataset | None) -> dict[str, Any]:
     facts = found.attrs
     return {
         "proportions": by_name(found, "class", "proportion"),
-        "intervals": by_name(
-            found, "class", lambda one: [float(one[f"interval_{end}"]) for end in ("low", "high")]
-        ),
+        "intervals": by_name(found, "class", partial(_ends, "interval")),
         "complete": facts["complete"],
         "complete_interval": [facts["complete_low"], facts["complete_high"]],
         "runs": facts["runs"],
@@ -207,7 +205,8 @@ def _classes(found: xr.Dataset, drawn: xr.Dataset | None) -> Table:
     if rest:
         sums = [sum(one.get(name, 0.0) for name in rest) for one in shares]
         rows.append([f"{len(rest)} others", *(cell for one in sums for cell in (_share(one), ""))])
-    rows.append(["complete", *(cell for one in both for cell in _complete(one))])
+    complete = [interval_cells(one.attrs, "complete", ".4f") for one in both]
+    rows.append(["complete", *(cell for cells in complete for cell in cells)])
     return Table(rows, heads)
 
 
@@ -215,20 +214,11 @@ def _class_cells(distribution: xr.Dataset, name: str) -> tuple[str, str]:
     if name not in distribution["class"].values:
         return "", ""
     row = distribution.sel({"class": name})
-    return _share(row["proportion"]), _between(row["interval_low"], row["interval_high"])
-
-
-def _complete(distribution: xr.Dataset) -> tuple[str, str]:
-    facts = distribution.attrs
-    return _share(facts["complete"]), _between(facts["complete_low"], facts["complete_high"])
+    return interval_cells(row.rename(proportion="interval"), "interval", ".4f")
 
 
 def _share(value: Any) -> str:
     return f"{float(value):.4f}"
-
-
-def _between(low: Any, high: Any) -> str:
-    return f"{_share(low)} to {_share(high)}"
 
 
 def _sizes_json(sizes: xr.Dataset) -> dict[str, Any]:
@@ -265,25 +255,24 @@ def _sizes(distribution: xr.Dataset, sizes: xr.Dataset, what: str) -> list[Part]
         if row["number"] > 0:
             first, last = int(row["size"]), int(row["size_to"])
             name = str(first) if first == last else f"{first} to {last}"
-            rows.append([name, *_size_cells(row, "number"), *_size_cells(row, "block_share")])
+            rows.append([name, *interval_cells(row, "number"), *interval_cells(row, "block_share")])
     heads = ["blocks in it", "assemblies per run", interval, "share of blocks", interval]
     times = sizes.sizes["time"] - 1
     known = {name: words for name, (_, words) in _OVER_TIME.items() if name in sizes}
     chosen = [sizes.isel(time=round(times * (n + 1) / SHOWN_TIMES)) for n in range(SHOWN_TIMES)]
     course = [
-        [f"{float(one['time']):.4g}", *(c for name in known for c in _size_cells(one, name))]
+        [f"{float(one['time']):.4g}", *(c for name in known for c in interval_cells(one, name))]
         for one in chosen
     ]
     over_time = [head for words in known.values() for head in (words, interval)]
     parts: list[Part] = [Table(rows, heads, what), Table(course, ["time (s)", *over_time])]
     if facts["compactness_runs"]:
-        ends = _range(facts["compactness_low"], facts["compactness_high"])
+        compactness, ends = interval_cells(facts, "compactness")
         within = f" ({interval} {ends})" if ends else ""
         parts.append(
-            f"compactness: {facts['compactness']:.3g}{within}, least perimeter over perimeter, "
-            "1 at most"
+            f"compactness: {compactness}{within}, least perimeter over perimeter, 1 at most"
         )
-    share, ends = _complete(distribution)
+    share, ends = interval_cells(distribution.attrs, "complete", ".4f")
     return [*parts, f"complete: {share} of the runs ({interval} {ends})"]
 
 
@@ -291,16 +280,6 @@ def _with_interval(found: xr.Dataset, name: str, key: str) -> dict[str, Any]:
     mean, low, high = (found[f"{name}{end}"].values.tolist() for end in ("", "_low", "_high"))
     interval = [low, high] if found[name].ndim == 0 else np.stack([low, high], axis=1).tolist()
     return {key: mean, f"{key}_interval": interval}
-
-
-def _size_cells(found: xr.Dataset, name: str) -> tuple[str, str]:
-    value, low, high = (float(found[f"{name}{end}"]) for end in ("", "_low", "_high"))
-    return f"{value:.3g}" if value == value else "", _range(low, high)
-
-
-def _range(low: float, high: float) -> str:
-    """Return an interval, nothing of a single run."""
-    return f"{low:.3g} to {high:.3g}" if low == low else ""
 
 
 """Classes in the table, those with the most time."""
@@ -347,17 +326,10 @@ def rate_rows(found: xr.Dataset, names: tuple[str, ...]) -> list[list[str]]:
             continue
         cells = [short_class(str(one["class"].values))]
         for name in names:
-            value, low, high = (float(one[f"{name}{end}"]) for end in ("", "_low", "_high"))
-            cells += [f"{value:.3g}" if value == value else "not reached", interval_text(low, high)]
+            value, ends = interval_cells(one, name)
+            cells += [value or "not reached", ends]
         rows.append(cells)
     return rows
-
-
-def interval_text(low: float, high: float) -> str:
-    """Return an interval in words; one end may be missing."""
-    if low != low:
-        return ""
-    return f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"{low:.3g} or more"
 
 
 def steady_words(steady: xr.Dataset) -> str:

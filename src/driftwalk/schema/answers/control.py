@@ -8,7 +8,16 @@ import numpy as np
 
 from driftwalk.core.intervals import proportion_interval
 from driftwalk.core.units import in_percent
-from driftwalk.schema.answers.parts import Answer, Following, Part, Row, Table, each
+from driftwalk.schema.answers.parts import (
+    Answer,
+    Following,
+    Part,
+    Row,
+    Table,
+    each,
+    interval_cells,
+    records,
+)
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -41,8 +50,8 @@ def policy_answer(found: xr.Dataset) -> Answer:
         ),
         mode_table(found),
     ]
-    facts_of_modes = _facts(found, {"modes": ("mode", ("constant_reached",))})
-    return Answer(parts, facts_of_modes, policy_warnings(found))
+    modes = records(found, "mode", ["constant_reached"])
+    return Answer(parts, {**_facts(found), "modes": modes}, policy_warnings(found))
 
 
 def policy_warnings(policy: xr.Dataset) -> list[str]:
@@ -91,14 +100,14 @@ def trial_answer(found: xr.Dataset) -> Answer:
         usage_table(found),
     ]
     names = ("reached", "reached_low", "reached_high", "gain", "gain_low", "gain_high")
-    facts_of_arms = _facts(found, {"arms": ("arm", names)})
-    return Answer(parts, {"standing": gain_word(found), **facts_of_arms}, [])
+    arms = records(found, "arm", names)
+    return Answer(parts, {"standing": gain_word(found), **_facts(found), "arms": arms}, [])
 
 
 def gain_text(test: xr.Dataset) -> str:
     """Return the gain of the policy over the best constant mode, with its interval."""
-    gain, low, high = (float(test[f"gain{end}"][CONSTANT]) for end in ("", "_low", "_high"))
-    return f"{gain:+.3f} ({low:+.3f} to {high:+.3f})"
+    gain, ends = interval_cells(test.isel(arm=CONSTANT), "gain", "+.3f")
+    return f"{gain} ({ends})"
 
 
 def gain_word(test: xr.Dataset) -> str:
@@ -125,16 +134,8 @@ def arm_table(test: xr.Dataset) -> Table:
     rows = [
         [
             str(one["arm"].values),
-            f"{float(one['reached']):.3f}",
-            f"{float(one['reached_low']):.3f} to {float(one['reached_high']):.3f}",
-            *(
-                ["", ""]
-                if at == 0
-                else [
-                    f"{float(one['gain']):+.3f}",
-                    f"{float(one['gain_low']):+.3f} to {float(one['gain_high']):+.3f}",
-                ]
-            ),
+            *interval_cells(one, "reached", ".3f"),
+            *(interval_cells(one, "gain", "+.3f") if at else ("", "")),
         ]
         for at, one in enumerate(each(test, "arm"))
     ]
@@ -162,13 +163,6 @@ def usage_table(test: xr.Dataset) -> Table:
     return Table(rows, ["mode", "share of the time", *(short_class(str(name)) for name in kept)])
 
 
-def _facts(found: xr.Dataset, tables: dict[str, tuple[str, tuple[str, ...]]]) -> dict[str, Any]:
+def _facts(found: xr.Dataset) -> dict[str, Any]:
     hidden = ("kind", "schema_version", "study", "arena")
-    own = {key: value for key, value in found.attrs.items() if key not in hidden}
-    return own | {
-        key: [
-            {dim: str(one[dim].values), **{name: float(one[name]) for name in names}}
-            for one in each(found, dim)
-        ]
-        for key, (dim, names) in tables.items()
-    }
+    return {str(key): value for key, value in found.attrs.items() if key not in hidden}

@@ -238,34 +238,24 @@ def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]
     names = [*numbers, *(f"{key}_interval" for key in numbers), *flat_variables(FIT), *_ATTRIBUTES]
     shown = {key: facts[key] for key in names if key in facts and key not in _NOT_IN_JSON}
     if "compared_law" in fit.dims:
-        shown["compared_laws"] = _laws(fit)
+        shown["compared_laws"] = by_name(fit, "compared_law", _law)
     shown |= {"recording": facts.get("source"), "warnings": facts["warnings"]}
     shown |= verdict_facts(stored_verdict(fit if check is None else check))
     if check is None:
         left_out = fit.attrs.get("check_left_out")
         return shown if left_out is None else {**shown, "check_left_out": left_out}
     measured = ("ks_distance", "ks_noise_floor", "ks_p_value")
-    distances = {key: float(check.attrs.get(key, "nan")) for key in measured}
     return {
         **shown,
-        **{key: value if isfinite(value) else None for key, value in distances.items()},
-        "detectable": {
-            name: size if isfinite(size) else None
-            for name, size in by_name(check, "criterion", "detectable").items()
-        },
+        **{key: check.attrs.get(key) for key in measured},
+        "detectable": by_name(check, "criterion", "detectable"),
     }
 
 
-def _laws(fit: xr.Dataset) -> dict[str, dict[str, float | None]]:
-    """Return the compared laws, by name; None where one has no solution."""
+def _law(one: xr.Dataset) -> dict[str, float]:
+    """Return how well a compared law does; NaN where it has no solution."""
     names = ("log_evidence", "log_score", "log_score_std")
-    columns = {name: fit[f"compared_{name}"].values.tolist() for name in names}
-    return {
-        str(law): {
-            name: values[at] if isfinite(values[at]) else None for name, values in columns.items()
-        }
-        for at, law in enumerate(fit["compared_law"].values)
-    }
+    return {name: float(one[f"compared_{name}"]) for name in names}
 
 
 PLACES: Final = {"component": "residual_component", "y": "cell_y", "x": "cell_x"}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import sentences
-from driftwalk.schema.answers.parts import Answer, Part, Row, Table, each
+from driftwalk.schema.answers.parts import Answer, Part, Row, Table, each, interval_cells, records
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -87,12 +87,7 @@ def rate_table(found: xr.Dataset, source: int) -> Table:
     """Return the rates of one data set."""
     share = f"{in_percent(found.attrs['confidence'])} interval"
     rows = [
-        [
-            transition_text(one),
-            int(one["count"]),
-            f"{float(one['rate']):.4g}",
-            f"{float(one['rate_low']):.4g} to {float(one['rate_high']):.4g}",
-        ]
+        [transition_text(one), int(one["count"]), *interval_cells(one, "rate", ".4g")]
         for one in each(found.isel(source=source), "transition")
     ]
     name = "" if found.sizes["source"] == 1 else f"{found['source'].values[source]} data set"
@@ -175,24 +170,17 @@ def transition_text(one: xr.Dataset) -> str:
 
 
 def _facts(found: xr.Dataset, reasons: list[str]) -> dict[str, Any]:
-    way = ("committor", "passage_time")
-    by: dict[str, Any] = {
-        "transitions": ("transition", ("count", "rate", "rate_low", "rate_high", "equal_p")),
+    units = {f"rate{end}": f"rate{end}_per_s" for end in ("", "_low", "_high")}
+    rates = tuple(units.values())
+    units |= {f"passage_time{end}": f"passage_time{end}_s" for end in ("", "_standard_error")}
+    named = found.rename({name: key for name, key in units.items() if name in found})
+    errors = ("committor_standard_error", "passage_time_standard_error_s")
+    by: dict[str, tuple[str, tuple[str, ...]]] = {
+        "transitions": ("transition", ("count", *rates, "equal_p")),
         "models": ("model", ("score", "score_behind", "score_behind_standard_error")),
         "tests": ("test", ("statistic", "statistic_low", "statistic_high", "p", "p_corrected")),
-        "classes": ("class", (*way, *(f"{name}_standard_error" for name in way))),
+        "classes": ("class", ("committor", "passage_time_s", *errors)),
     }
-    units = {"rate": "rate_per_s", "rate_low": "rate_low_per_s", "rate_high": "rate_high_per_s"}
-    units |= {name: f"{name}_s" for name in by["classes"][1] if name.startswith("passage_time")}
-    tables = {
-        key: [
-            {
-                dim: str(one[dim].values),
-                **{units.get(name, name): one[name].values for name in names if name in one},
-            }
-            for one in each(found, dim)
-        ]
-        for key, (dim, names) in by.items()
-    }
+    tables = {key: records(named, *table) for key, table in by.items()}
     own = {k: v for k, v in found.attrs.items() if k not in ("kind", "schema_version")}
     return {**own, "reasons": reasons, **tables}

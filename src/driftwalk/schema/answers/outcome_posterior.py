@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import sentences
-from driftwalk.schema.answers.parts import Answer, Estimate, Part, Row, Table, each
+from driftwalk.schema.answers.parts import Answer, Estimate, Part, Row, Table, each, records
 from driftwalk.schema.description import Number
 from driftwalk.schema.kinds.sensitivity import AXIS_NUMBERS, axis_number
 from driftwalk.schema.shapes import short_class
@@ -126,9 +125,6 @@ def data_table(found: xr.Dataset) -> Table:
 
 
 def _facts(found: xr.Dataset, reasons: list[str]) -> dict[str, Any]:
-    def plain(value: Any) -> Any:
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
     parameters = {}
     for one in each(found, "parameter"):
         number = number_of(one)
@@ -144,23 +140,10 @@ def _facts(found: xr.Dataset, reasons: list[str]) -> dict[str, Any]:
             "limit": side,
             "range": [float(one["low"]), float(one["high"])],
         }
-    data = [
-        {
-            "data": str(one["data"].values),
-            **{name: bool(one[name]) for name in ("observed", "offered")},
-            **{name: plain(float(one[name])) for name in ("power", "coverage")},
-            **{
-                name: [plain(value) for value in one[name].values.tolist()]
-                for name in ("interval_coverage", "expected_width", "width")
-            },
-        }
-        for one in each(found, "data")
-    ]
-    classes = [
-        {"class": str(one["class"].values), "count": int(one["count"]),
-         "predicted": float(one["share"])}
-        for one in each(found, "class")
-    ]  # fmt: skip
+    seen = ("observed", "offered", "power", "coverage")
+    shares = ("interval_coverage", "expected_width", "width")
+    data = records(found, "data", (*seen, *shares))
+    classes = records(found.rename(share="predicted"), "class", ("count", "predicted"))
     own = {k: v for k, v in found.attrs.items() if k not in ("kind", "schema_version", "study")}
     return {
         **own, "reasons": reasons, "parameters": parameters, "data": data, "classes": classes

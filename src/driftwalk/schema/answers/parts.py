@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from driftwalk.core.units import in_percent
@@ -257,6 +257,29 @@ def by_name(
     if isinstance(value, str):
         return dict(zip(map(str, found[dim].values), found[value].values.tolist(), strict=True))
     return {str(part[dim].values): value(part) for part in each(found, dim)}
+
+
+def records(found: xr.Dataset, dim: str, names: Iterable[str]) -> list[dict[str, Any]]:
+    """Return the name of each part along a dimension, with the numbers that it has."""
+    return [
+        {
+            dim: str(one[dim].values),
+            **{name: one[name].values.tolist() for name in names if name in one},
+        }
+        for one in each(found, dim)
+    ]
+
+
+def interval_cells(
+    found: xr.Dataset | Mapping[str, Any], name: str, form: str = ".3g"
+) -> tuple[str, str]:
+    """Return a number and its interval, whose upper end may be missing, as cells of a table.
+
+    Where a number is unknown, its cell is empty.
+    """
+    value, low, high = (float(found[f"{name}{end}"]) for end in ("", "_low", "_high"))
+    ends = f"{low:{form}} to {high:{form}}" if math.isfinite(high) else f"{low:{form}} or more"
+    return "" if math.isnan(value) else f"{value:{form}}", "" if math.isnan(low) else ends
 
 
 def duration_text(seconds: float) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.units import in_percent
-from driftwalk.schema.answers.parts import Answer, Following, Part, Row, Table
+from driftwalk.schema.answers.parts import Answer, Following, Part, Row, Table, interval_cells
 from driftwalk.schema.answers.sensitivity import key_of
 from driftwalk.schema.kinds.sensitivity import AXES, axis_number
 from driftwalk.schema.shapes import short_class
@@ -98,10 +98,10 @@ def point_words(point: Mapping[str, Any]) -> str:
 def yield_words(found: xr.Dataset, at: int) -> str:
     """Return the yield of a setting with its exact interval, and of how many fresh runs."""
     one = found.isel(setting=at)
+    share, ends = interval_cells(one, "fresh_yield", ".3f")
     return (
-        f"{float(one['fresh_yield']):.3f} by {found.attrs['by_s']:g} s   "
-        f"{in_percent(found.attrs['confidence'])} interval {float(one['fresh_yield_low']):.3f} to "
-        f"{float(one['fresh_yield_high']):.3f}   {int(one['fresh_runs'])} fresh runs"
+        f"{share} by {found.attrs['by_s']:g} s   {in_percent(found.attrs['confidence'])} interval "
+        f"{ends}   {int(one['fresh_runs'])} fresh runs"
     )
 
 
@@ -169,14 +169,10 @@ def setting_table(found: xr.Dataset) -> Table:
     rows = []
     for at in order[:LISTED]:
         one = found.isel(setting=at)
-        low, high, fresh = (
-            float(one[f"fresh_yield{end}"]) for end in ("_low", "_high", "")
-        )  # fmt: skip
         rows.append(
             [
                 setting_words(found, at),
-                f"{fresh:.3f}" if math.isfinite(fresh) else "",
-                f"{low:.3f} to {high:.3f}" if math.isfinite(fresh) else "",
+                *interval_cells(one, "fresh_yield", ".3f"),
                 f"{share[at]:.3f}",
                 int(one["runs"]),
                 "cannot be distinguished"
@@ -194,14 +190,12 @@ def setting_table(found: xr.Dataset) -> Table:
 def front_table(found: xr.Dataset) -> Table:
     """Return the front of yield and time: where the best setting changes, and the yields there."""
     front = found["front_setting"].values
-    value, low, high = (found[f"front_yield{end}"].values for end in ("", "_low", "_high"))
     last = len(front) - 1
     tenths = range(last // 10, last + 1, max(last // 10, 1))
     rows = [
         [
             f"{float(found['time'][at]):g}",
-            f"{value[at]:.3f}",
-            f"{low[at]:.3f} to {high[at]:.3f}",
+            *interval_cells(found.isel(time=at), "front_yield", ".3f"),
             setting_words(found, int(front[at])),
         ]
         for at in tenths
@@ -212,24 +206,22 @@ def front_table(found: xr.Dataset) -> Table:
 
 def _facts(found: xr.Dataset) -> dict[str, Any]:
     own = {k: v for k, v in found.attrs.items() if k not in ("kind", "schema_version", "best")}
-    names = varied(found)
-    settings = [
+    settings = _rows(
         {
-            **{key_of(name): found[name].values[at] for name in names},
-            **{name: found[name].values[at] for name in NUMBERS},
-            "standing": str(found["standing"].values[at]),
+            **{key_of(name): found[name] for name in varied(found)},
+            **{name: found[name] for name in (*NUMBERS, "standing")},
         }
-        for at in range(found.sizes["setting"])
-    ]
-    front = [
+    )
+    front = _rows(
         {
-            "time_s": float(found["time"][at]),
-            "setting": int(found["front_setting"][at]),
-            **{
-                f"yield{end}": float(found[f"front_yield{end}"][at])
-                for end in ("", "_low", "_high")
-            },
+            "time_s": found["time"],
+            "setting": found["front_setting"],
+            **{f"yield{end}": found[f"front_yield{end}"] for end in ("", "_low", "_high")},
         }
-        for at in range(found.sizes["time"])
-    ]
+    )
     return {**own, "best": settings[int(found.attrs["best"])], "settings": settings, "front": front}
+
+
+def _rows(columns: Mapping[str, xr.DataArray]) -> list[dict[str, Any]]:
+    rows = zip(*(one.values for one in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]

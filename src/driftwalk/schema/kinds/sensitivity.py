@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -58,6 +59,18 @@ AXIS_NUMBERS: Final = {
 def axis_number(name: str) -> Number:
     """Return the words, the symbol and the unit of an axis for a reader."""
     return AXIS_NUMBERS.get(name, Number(name))
+
+
+def ranked_axes(names: Sequence[str]) -> list[str]:
+    """Return axes in the order from x to y: the drag lies along x, as in the figures of a run.
+
+    Examples
+    --------
+    >>> ranked_axes(["latching", "force_std", "drag_coefficient"])
+    ['drag_coefficient', 'force_std', 'latching']
+    """
+    order = [*AXIS_NUMBERS]
+    return sorted(names, key=lambda name: order.index(name) if name in order else len(order))
 
 
 _DIMENSIONS: Final = "\n".join(f"{one.name}: settings, where it varies" for one in AXES)

@@ -245,16 +245,18 @@ def open_run_folder(folder: Path) -> StoredRun:
     return run
 
 
+def holds_run(path: Path) -> bool:
+    """Return whether a folder holds a run that can be read, finished or not."""
+    try:
+        return path.is_dir() and state_of(path) != "new"
+    except DriftwalkError:
+        return False
+
+
 def _no_run(folder: Path) -> str:
     if not folder.is_dir():
         return f"{folder} does not exist" if not folder.exists() else f"{folder} is not a directory"
-    inside = []
-    for entry in visible(folder):
-        try:
-            if entry.is_dir() and state_of(entry) != "new":
-                inside.append(entry.name)
-        except DriftwalkError:
-            continue
+    inside = [entry.name for entry in visible(folder) if holds_run(entry)]
     if inside:
         return f"{folder} is not a run directory, but holds some: name {' or '.join(inside)} in it"
     *most, last = dict.fromkeys(kind.command for kind in RUN_KINDS.values())

@@ -27,6 +27,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.page import encode_array
 from driftwalk.schema import body_track
+from driftwalk.simulation.backend import Camera
 from driftwalk.viewer.watch.recording_steps import RecordedSteps, recorded_steps
 
 if TYPE_CHECKING:
@@ -37,15 +38,6 @@ if TYPE_CHECKING:
 
 INTERVAL_S: Final = 0.1
 """Time between the points of a step where there is no recording [s]."""
-
-
-class Camera(NamedTuple):
-    """Effect of the camera on a position."""
-
-    noise: float
-    """[m]"""
-    quantum: float
-    """[m], 0 for none."""
 
 
 class Beside(NamedTuple):
@@ -75,8 +67,7 @@ def beside(recording: xr.Dataset, study: Study, *, body: str | None = None) -> B
     """
     steps = recorded_steps(recording, study, body=body)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
-    seen = recorded_camera(body_track(recording, body), study, position_quantum=quantum)
-    camera = Camera(seen.position_noise, seen.position_quantum)
+    camera = recorded_camera(body_track(recording, body), study, position_quantum=quantum)
     return Beside(steps, ks_reference(steps.points), camera)
 
 
@@ -94,7 +85,7 @@ class MotionWindow:
     def __init__(self, recording: Beside | None, *, seed: int) -> None:
         self.interval = INTERVAL_S if recording is None else recording.steps.step_interval
         self._recording = recording
-        self._camera = Camera(0.0, 0.0) if recording is None else recording.camera
+        self._camera = Camera() if recording is None else recording.camera
         self._random = np.random.default_rng(seed)
         self._lock = threading.Lock()
         self._floor: tuple[int, float | None] = (0, None)
@@ -121,9 +112,10 @@ class MotionWindow:
         """
         single = np.bincount(assembly, minlength=x.size)[assembly] == 1
         place = np.stack([x, y], axis=1)
-        place += self._camera.noise * self._random.standard_normal(place.shape)
-        if self._camera.quantum > 0.0:
-            place = self._camera.quantum * np.rint(place / self._camera.quantum)
+        place += self._camera.position_noise * self._random.standard_normal(place.shape)
+        quantum = self._camera.position_quantum
+        if quantum > 0.0:
+            place = quantum * np.rint(place / quantum)
         place[~single] = np.nan
         with self._lock:
             if self._place.shape[1] != x.size:
@@ -162,10 +154,8 @@ class MotionWindow:
         points = self.points()
         recording = self._recording
         if recording is None:
-            lengths, angles = (
-                step_length_edges(*([points[:, 0]] if len(points) else [[1.0]])),
-                (turning_angle_edges()),
-            )
+            lengths = step_length_edges(points[:, 0] if len(points) else [1.0])
+            angles = turning_angle_edges()
         else:
             lengths, angles = recording.steps.length_edge, recording.steps.angle_edge
         shape = (lengths.size - 1, angles.size - 1)

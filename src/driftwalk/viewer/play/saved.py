@@ -206,8 +206,8 @@ def _motion(source: PlaySource) -> dict[str, Any]:
             "points": _doubles(steps.points),
             "length_edge": steps.length_edge.tolist(),
             "angle_edge": steps.angle_edge.tolist(),
-            "noise": recording.camera.noise,
-            "quantum": recording.camera.quantum,
+            "noise": recording.camera.position_noise,
+            "quantum": recording.camera.position_quantum,
             "block_length": usual_block_length(steps_memory_time(steps.points)),
         }
     return found

@@ -30,10 +30,10 @@ from driftwalk.core.units import in_percent
 from driftwalk.page import encode_array
 from driftwalk.page.parts import axis, empty_section, section, table_section
 from driftwalk.page.sections.outcomes import cells_of, class_items
-from driftwalk.page.sections.sensitivity_maps import over_time_part, ranked_axes
+from driftwalk.page.sections.sensitivity_maps import over_time_part
 from driftwalk.plot.parts.outcome_classes import are_discs, class_names, classes_to_show
 from driftwalk.schema.answers.yields import LISTED, point_words
-from driftwalk.schema.kinds.sensitivity import axis_number
+from driftwalk.schema.kinds.sensitivity import axis_number, ranked_axes
 from driftwalk.schema.shapes import counted_assemblies
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
@@ -106,19 +106,15 @@ class RunningAssembly(Running):
         sound = (unit.arrays["status"].astype(np.int64) & BROKEN) == 0
         self._runs[name] += unit.stop - unit.start
         chirality, block = self._study.assembly.chirality, self._study.block
-        if not block.has_lattice:
-            for pose, assembly in zip(
-                unit.arrays["pose"][sound], unit.arrays["assembly"][sound], strict=True
-            ):
-                self._count[name][disc_class(pose, assembly, **block.contact_size)] += 1
-            return
-        for cell, assembly in zip(
-            unit.arrays["cell"][sound], unit.arrays["assembly"][sound], strict=True
-        ):
+        places = unit.arrays["cell" if block.has_lattice else "pose"][sound]
+        for place, assembly in zip(places, unit.arrays["assembly"][sound], strict=True):
+            if not block.has_lattice:
+                self._count[name][disc_class(place, assembly, **block.contact_size)] += 1
+                continue
             # Few ways of lying on the lattice come again and again.
-            key = cell.tobytes() + assembly.tobytes()
+            key = place.tobytes() + assembly.tobytes()
             if key not in self._class_of:
-                self._class_of[key] = world_class(cell, assembly, chirality=chirality)
+                self._class_of[key] = world_class(place, assembly, chirality=chirality)
             self._count[name][self._class_of[key]] += 1
 
 
@@ -304,9 +300,7 @@ class RunningSensitivity(Running):
     def _distances(self) -> npt.NDArray[np.float64]:
         """Return the l1 distance of every setting to the pooled reference, NaN where unknown."""
         distance = np.full(int(np.prod(self._shape)), np.nan)
-        pooled: Counter[str] = Counter()
-        for count in self._count["reference"].values():
-            pooled.update(count)
+        pooled: Counter[str] = sum(self._count["reference"].values(), Counter())
         blocks = _blocks(pooled)
         for setting, count in self._count["map"].items():
             # Outcomes of another number of blocks have nothing in common with the reference.

@@ -16,6 +16,7 @@ from driftwalk.core.text_files import path_inside, text_of_name
 from driftwalk.page.html import page_frame
 from driftwalk.page.parts import empty_section
 from driftwalk.schema.runs import RUN_KINDS, load_maker
+from driftwalk.schema.runs.contents import holds_run
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.watch.shards import RunReader, quiet_time
 
@@ -264,7 +265,7 @@ def require_run(folder: Path) -> None:
     elif state == "unfinished":
         unfinished_specification(folder)
     else:
-        inside = [path.name for path in sorted(folder.iterdir()) if _holds_run(path)]
+        inside = [path.name for path in sorted(folder.iterdir()) if holds_run(path)]
         hint = f"; there are runs in it: {', '.join(inside[:3])}" if inside else ""
         raise InputError(f"{folder}: this directory holds no run of driftwalk{hint}")
 
@@ -320,13 +321,6 @@ def file_in(folder: Path, name: str) -> Path | None:
 
 def _ids(page: Mapping[str, Any]) -> list[str]:
     return [section["id"] for section in page["sections"]]
-
-
-def _holds_run(path: Path) -> bool:
-    try:
-        return path.is_dir() and state_of(path) != "new"
-    except DriftwalkError:
-        return False
 
 
 def _stamp(folder: Path, names: Sequence[str] = (MANIFEST_FILE, RECORD_FILE)) -> tuple[Any, ...]:
