@@ -32,8 +32,27 @@ WORDS: Final = {
     "so long": "this long",
     "for ever": "permanently",
     "of the very": "of the … itself",
+    "whoever": "anyone who",
+    "nobody": "unknown, or not asked for",
+    "in vain": "without a result",
+    "as it were": "nothing",
+    "otherwise than": "not as, or unlike",
+    "feign": "imitate",
+    "feigns": "imitates",
+    "feigned": "imitated",
+    "condemn": "reject",
+    "condemns": "rejects",
+    "condemned": "rejected",
+    "hopeless": "given up",
+    "befell": "happened to",
+    "blame": "the cause, or at fault",
+    "blamed": "named as the cause",
 }
 """Words to avoid, each with the plain one."""
+REFERENCES: Final = re.compile(r"\b(?:that|those)\s+of\b", re.IGNORECASE)
+MOST_REFERENCES: Final = {"package": 265, "pages": 65}
+"""How often "that of" and "those of" may stand in each. The limits only fall: a reader has to look
+back for what is meant, so name it again, or use a genitive."""
 ALLOWED: Final = {
     r'"beside"|\Abeside\Z': "a value of the plotting functions' argument colorbar",
     r"\bbeside(?= ?[=:])": "an argument of plot_outcomes and outcome_figure",
@@ -128,3 +147,15 @@ def test_strings_and_docstrings_are_plain() -> None:
         for fault in faults_of(re.sub(r"\n +", "\n", one.text))
     ]
     assert not found, "\n".join(found)
+
+
+def test_a_reader_seldom_has_to_look_back() -> None:
+    texts = {
+        "package": [one.text for one in package_texts()],
+        "pages": [prose_of(page.read_text(encoding="utf-8")) for page in PAGES],
+    }
+    found = {
+        where: sum(len(REFERENCES.findall(text)) for text in many) for where, many in texts.items()
+    }
+    over = {where: count for where, count in found.items() if count > MOST_REFERENCES[where]}
+    assert not over, f"{over} of {MOST_REFERENCES}"
