@@ -23,9 +23,9 @@ from run import FIRST_SEED, SETS, current, file_of
 import driftwalk as dw
 from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, write_manifest
-from driftwalk.likelihood.check.criteria import VERDICT
+from driftwalk.likelihood.check.criteria import MODEL_CHECK
 from driftwalk.likelihood.law.forward_selection import least_effects
-from driftwalk.schema.answers.force_law import SELECTION
+from driftwalk.schema.answers.force_law import FORWARD_SELECTION
 
 Lines = Sequence[dict[str, Any]]
 
@@ -57,10 +57,11 @@ SHOWN: Final = {
 }
 """Words, factor and unit of the numbers of a fit."""
 SIGMAS: Final = {
-    "force_memory": SELECTION.memory_sigmas,
-    "strength_1": math.sqrt(SELECTION.strength_chi_squared),
+    "force_memory": FORWARD_SELECTION.memory_sigmas,
+    "strength_1": math.sqrt(FORWARD_SELECTION.strength_chi_squared),
 }
-"""Standard deviations that open a number, where they are others than `SELECTION.opened_sigmas`."""
+"""Standard deviations that open a number, where they are others than
+`FORWARD_SELECTION.opened_sigmas`."""
 
 
 def main() -> None:
@@ -139,7 +140,10 @@ def limits_table(lines: Lines) -> str:
                 if one["minutes"] == minutes and name in one.get("departure_std", {})
             ]
             size = np.array(
-                [_size(name, SIGMAS.get(name, SELECTION.opened_sigmas) * one) for one in std]
+                [
+                    _size(name, SIGMAS.get(name, FORWARD_SELECTION.opened_sigmas) * one)
+                    for one in std
+                ]
             )
             row.append(
                 f"{factor * np.median(size):.2g} ({factor * size.min():.2g} to "
@@ -166,7 +170,7 @@ def is_named(case: str, line: dict[str, Any]) -> bool:
 
 def is_rejected(line: dict[str, Any]) -> bool:
     """Return whether the check fails, at the level that it has now."""
-    return bool(line.get("least_p_value", 1.0) < VERDICT.level)
+    return bool(line.get("least_p_value", 1.0) < MODEL_CHECK.level)
 
 
 def right_table(lines: Lines) -> str:

@@ -88,7 +88,7 @@ def recovered(model: str, number: int, threads: int) -> dict[str, Any]:
     found = dw.calibration.calibrate(
         simulated(model, number), dw.motion_model(model, clearance=0.0), threads=threads
     )
-    draws = found["draws"].transpose("parameter", "draw").values
+    draws = found["posterior_sample"].transpose("parameter", "draw").values
     return {
         "model": model,
         "recording": number,
@@ -103,7 +103,9 @@ def recovered(model: str, number: int, threads: int) -> dict[str, Any]:
             for name, row in zip(found["parameter"].values.tolist(), draws, strict=True)
         },
         "estimate_from": found.attrs["estimate_from"],
-        "misfit": [float(found[name]) for name in ("misfit", "usual_misfit", "most_misfit")],
+        "misfit": [
+            float(found[name]) for name in ("discrepancy", "discrepancy_median", "discrepancy_q95")
+        ],
         "score": float(found["score"]),
         "explained": str(found["verdict"].values) == "explains",
         "seconds": round(time.perf_counter() - began, 1),

@@ -95,7 +95,7 @@ def summaries_of(found: Any) -> dict[str, dict[str, Any]]:
             "named": bool(asked["named"][at]),
             **{
                 key: float(asked[key][at])
-                for key in ("misfit", "usual_misfit", "most_misfit", "unlikely")
+                for key in ("discrepancy", "discrepancy_median", "discrepancy_q95", "deviance")
             },
         }
         for at, name in enumerate(asked["model"].values)

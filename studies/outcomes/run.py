@@ -23,7 +23,7 @@ import driftwalk as dw
 from driftwalk.assembly.outcome_posterior.emulator import Emulator, log_likelihoods
 from driftwalk.assembly.outcome_posterior.problem import Nodes
 from driftwalk.assembly.outcome_posterior.records import KINDS, Categories, Record
-from driftwalk.assembly.outcome_posterior.region import REGION_POLICY, covered, self_check
+from driftwalk.assembly.outcome_posterior.region import CREDIBLE_REGION, covered, self_check
 from driftwalk.model import apply_overrides
 from driftwalk.sweep import ShardStore
 
@@ -60,7 +60,7 @@ def row_of(
     chosen = [self_check(point, truth[one], level[one], own[one]).power for one in halves]
     row: dict[str, Any] = {"kind": kind, "powers": chosen}
     for label, powers in (("", chosen[::-1]), ("_at_power_1", [1.0, 1.0])):
-        powers = np.nan_to_num(powers, nan=REGION_POLICY.powers[-1])
+        powers = np.nan_to_num(powers, nan=CREDIBLE_REGION.powers[-1])
         joint, marginal, width = (
             np.concatenate(part)
             for part in zip(
@@ -73,9 +73,9 @@ def row_of(
         )
         row[f"coverage{label}"] = float(joint.mean())
         row[f"interval_coverage{label}"] = marginal.mean(axis=0).tolist()
-        part = width / REGION_POLICY.confidence
+        part = width / CREDIBLE_REGION.confidence
         row[f"width{label}"] = np.median(part, axis=0).round(3).tolist()
-        row[f"not_determined{label}"] = (part >= REGION_POLICY.prior_like).mean(axis=0).tolist()
+        row[f"not_determined{label}"] = (part >= CREDIBLE_REGION.prior_like).mean(axis=0).tolist()
     return row
 
 

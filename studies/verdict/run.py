@@ -193,8 +193,8 @@ def calibrated(truth: dict[str, Any], recording: Path, program: str, place: Path
     return {
         "calibration": {
             "verdict": word,
-            "misfit": answer.get("misfit"),
-            "most_misfit": answer.get("most_misfit"),
+            "misfit": answer.get("discrepancy"),
+            "most_misfit": answer.get("discrepancy_q95"),
             "numbers": answer["parameters"],
             **went,
         }

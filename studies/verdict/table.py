@@ -97,7 +97,7 @@ def rows(lines: list[Line]) -> list[Row]:
     told = [one for line in measured for one in determined(line)]
     return [
         row("explains, with a wrong number or a wrong model", explained, falsely_reassured),
-        row("judgeable, right model and numbers: does not explain", right, is_condemned),
+        row("judgeable, right model and numbers: does not explain", right, is_rejected),
         row("judgeable: cannot tell", able, lambda line: line["verdict"] == CANNOT),
         row("judgeable: refused", able, lambda line: line["verdict"] == "refused"),
         row("explains: 90 % intervals of C_d and sigma_F that hold the truth", held, bool),
@@ -228,7 +228,7 @@ def is_right(line: Line) -> bool:
     return bool(truths_words(line))
 
 
-def is_condemned(line: Line) -> bool:
+def is_rejected(line: Line) -> bool:
     """Return whether the right answer is said not to explain the recording."""
     if is_block(line):
         return bool(line["verdict"] == DOES_NOT)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 import driftwalk as dw
-from driftwalk.assembly.yields.selection import SELECTION, Tally, halving, tell_apart
+from driftwalk.assembly.yields.selection import HALVING, Tally, halving, tell_apart
 
 SETTINGS = list(product((0.0, 0.5, 1.0, 1.5), (0.2, 0.55, 1.2)))
 TASKS = (("T", 300.0), ("T", 120.0), ("O", 300.0))
@@ -88,13 +88,13 @@ def repeated(reached: Any) -> dict[str, Any]:
     rows = []
     for repetition in range(REPETITIONS):
         random = np.random.default_rng([1, repetition])
-        drawn = random.integers(POOL, size=BUDGET * (1 + SELECTION.most))
+        drawn = random.integers(POOL, size=BUDGET * (1 + HALVING.most))
         tally = Tally(lambda arms, runs, d=drawn: reached[list(arms)][:, d[runs.start : runs.stop]])
         stayed = halving(tally, range(len(SETTINGS)), BUDGET)
         winner = max(stayed, key=lambda arm: stayed[arm])
         found = tell_apart(
             tally, range(len(SETTINGS)), indifference=INDIFFERENCE, confidence=CONFIDENCE,
-            budget=SELECTION.most * BUDGET,
+            budget=HALVING.most * BUDGET,
         )  # fmt: skip
         kept = [found.best, *found.alike]
         rows.append(

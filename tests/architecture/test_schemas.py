@@ -17,7 +17,7 @@ OF_WHAT_IS_GIVEN = {
     *("value", "low", "high", "variance"),
     *("estimate", "interval", "coarse_estimate", "first_half_estimate"),
     *("number_value", "departure_estimate", "departure_std"),
-    *("profile_value", "searched_estimate", "draws", "range", "truth"),
+    *("profile_value", "searched_estimate", "posterior_sample", "range", "truth"),
     *("node_value", "truth_value"),
     *("check_recorded", "check_median", "check_low", "check_high"),
 }

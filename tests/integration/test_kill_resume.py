@@ -1,4 +1,4 @@
-"""Kills, rivals, full disks and Ctrl-C against a real run in processes of its own.
+"""Kills, concurrent runs, full disks and Ctrl-C against a real run in processes of its own.
 
 The sweep is cheap and synthetic: random numbers with an address, like those of a simulation.
 """

@@ -330,7 +330,7 @@ def test_intervals_of_shares(study: dict[str, ModuleType]) -> None:
 ANSWERS = {
     "reassured": ("explains", 0.60, (0.55, 0.65), True),
     "right": ("explains", 0.46, (0.42, 0.50), True),
-    "condemned": ("does not explain", 0.45, (0.42, 0.50), True),
+    "rejected": ("does not explain", 0.45, (0.42, 0.50), True),
     "shy": ("cannot tell", 0.45, (0.42, 0.50), True),
     "rightly shy": ("cannot tell", 0.9, (0.42, 1.50), False),
 }

@@ -60,7 +60,7 @@ class _Moment:
         return LatticeWorld.of(self.state).outcome(self._chirality)
 
 
-class _Wishes(NamedTuple):
+class _NextSettings(NamedTuple):
     """Settings of a world from its next force interval on."""
 
     study: Study
@@ -131,8 +131,8 @@ class LiveTank:
         self._flow = plan.flow
         self._lock = Lock()
         # Never held while the world advances. Where both are held, this one is taken second.
-        self._wishes_lock = Lock()
-        self._wishes = _Wishes(plan.study, 1.0)
+        self._next_lock = Lock()
+        self._next_settings = _NextSettings(plan.study, 1.0)
         self._model = plan.model()
         self.restart(start=start)
 
@@ -151,8 +151,8 @@ class LiveTank:
         InputError
             As the class.
         """
-        with self._lock, self._wishes_lock:
-            study, settings = self._wishes.study, {"seed": seed}
+        with self._lock, self._next_lock:
+            study, settings = self._next_settings.study, {"seed": seed}
             plan = make_plan(study, self._flow, settings=settings, index=np.arange(1), ends=False)
             forces = plan.study.forces
             self._world = _core.LiveWorld(
@@ -164,7 +164,9 @@ class LiveTank:
                 **plan.rules(),
                 flow_start=0.0 if plan.flow_start is None else float(plan.flow_start[0]),
             )
-            self._wishes = self._active = _Wishes(plan.study, self._wishes.flow_scale)
+            self._next_settings = self._active = _NextSettings(
+                plan.study, self._next_settings.flow_scale
+            )
             self._set_forces()
             self._set_pull()
             self._steps_per_interval = round(forces.force_interval_s / plan.study.time_step_s)
@@ -189,7 +191,7 @@ class LiveTank:
             numbers are lost: then only `restart` helps.
         """
         with self._lock:
-            step, had = self._wishes.study.time_step_s, self._world.step
+            step, had = self._next_settings.study.time_step_s, self._world.step
             steps, self._due = steps_of(
                 duration_s, self._due, step=step, had=had, otherwise=", or restart it"
             )
@@ -265,16 +267,16 @@ class LiveTank:
             "assembly.blocks": blocks,
         }
         overrides = {key: value for key, value in given.items() if value is not None}
-        with self._wishes_lock:
-            wishes = self._wishes
-            study = apply_overrides(wishes.study, overrides)
+        with self._next_lock:
+            before = self._next_settings
+            study = apply_overrides(before.study, overrides)
             require_room(study)
             require_bonds(study)
             block_pull(study)
-            scale = wishes.flow_scale if flow_scale is None else flow_scale
+            scale = before.flow_scale if flow_scale is None else flow_scale
             if not 0.0 <= scale < math.inf:
                 raise InputError(f"flow_scale must be a finite number from 0 on, got {scale}")
-            self._wishes = _Wishes(study, float(scale), part or wishes.part)
+            self._next_settings = _NextSettings(study, float(scale), part or before.part)
 
     def part(self) -> None:
         """Part all assemblies into their blocks, which move on as they did.
@@ -294,17 +296,17 @@ class LiveTank:
     @property
     def study(self) -> Study:
         """The study with the values wanted last."""
-        return self._wishes.study
+        return self._next_settings.study
 
     @property
     def has_lattice(self) -> bool:
         """Whether the blocks are squares, which latch face to face; others latch as they lie."""
-        return self._wishes.study.block.has_lattice
+        return self._next_settings.study.block.has_lattice
 
     @property
     def flow_scale(self) -> float:
         """The factor on the velocity of the water wanted last."""
-        return self._wishes.flow_scale
+        return self._next_settings.flow_scale
 
     @property
     def time(self) -> float:
@@ -319,7 +321,7 @@ class LiveTank:
     @property
     def waiting(self) -> int:
         """Number of blocks that are wanted but not in the tank yet."""
-        return max(self._wishes.study.assembly.blocks - self.blocks, 0)
+        return max(self._next_settings.study.assembly.blocks - self.blocks, 0)
 
     @property
     def x(self) -> Floats:
@@ -386,18 +388,20 @@ class LiveTank:
             into = self._world.step % self._steps_per_interval
             if into == 0:
                 self._fulfil()
-            waits = self._wishes is not self._active or self.waiting > 0
+            waits = self._next_settings is not self._active or self.waiting > 0
             now = min(steps, self._steps_per_interval - into) if waits else steps
             self._step(now)
             steps -= now
 
     def _fulfil(self) -> None:
         """Give the world what is wished, at the beginning of a force interval."""
-        with self._wishes_lock:
-            wished = self._wishes
-            changed = wished is not self._active
+        with self._next_lock:
+            following = self._next_settings
+            changed = following is not self._active
             before = self._active.study.assembly
-            self._wishes = self._active = wished._replace(part=False) if wished.part else wished
+            self._next_settings = self._active = (
+                following._replace(part=False) if following.part else following
+            )
         if changed:
             self._set_forces()
             self._set_pull()
@@ -413,7 +417,7 @@ class LiveTank:
             if (rules.faces, rules.binding) != (before.faces, before.binding):
                 table = face_table(rules)
                 self._world.set_faces(None if table is None else table.native())
-        if wished.part:
+        if following.part:
             self._world.part()
             self._look()
         if self._active.study.assembly.blocks != self.blocks:

@@ -40,7 +40,7 @@ _LATCHING: Final = ("none", "collision", "connector")
 """The ways of latching in the order of the native core's numbers."""
 
 
-class StartPolicy(NamedTuple):
+class StartAssemblyPolicy(NamedTuple):
     """Which assemblies are a start."""
 
     off_lattice: float = 0.05
@@ -48,7 +48,7 @@ class StartPolicy(NamedTuple):
     chosen by hand: a tracked block is measured to a few hundredths of its side."""
 
 
-START_POLICY: Final = StartPolicy()
+START_ASSEMBLY: Final = StartAssemblyPolicy()
 
 
 class _Settings(NamedTuple):
@@ -64,7 +64,7 @@ class _Settings(NamedTuple):
 class TankBatch:
     """Many tanks of blocks that keep their state, and whose parameters change one by one.
 
-    Each world is a `LiveTank` of its own: with ``backend="reference"`` it has the same bits as one
+    Each world is a separate `LiveTank`: with ``backend="reference"`` it has the same bits as one
     that gets the same changes at the same times, with the default those of `assembly_path`, in
     single precision and three times faster. Neither the threads nor the other worlds change its
     numbers.
@@ -157,7 +157,7 @@ class TankBatch:
         else:
             self._batch = self._begin(plans, start_poses(plan, start), None)
         forces = plan.study.forces
-        self._settings = self._wishes = _Settings(
+        self._settings = self._next_settings = _Settings(
             flow=np.zeros(count, dtype=np.int32),
             latching=np.full(count, _LATCHING.index(plan.study.assembly.latching), dtype=np.int32),
             flow_scale=np.ones(count),
@@ -222,26 +222,26 @@ class TankBatch:
         InputError
             When a value is out of range. Nothing changes then.
         """
-        wishes = self._wishes._asdict()
+        following = self._next_settings._asdict()
         if flow is not None:
             index = self._one_each("flow", flow, kinds="iu")
             flows = len(self._kept[0])
             if not (np.isin(index, np.arange(flows))).all():
                 raise InputError(f"flow: expected indices of {flows} flows, from 0 on")
-            wishes["flow"] = index.astype(np.int32)
+            following["flow"] = index.astype(np.int32)
         if latching is not None:
             names = self._one_each("latching", latching, kinds="U")
-            wishes["latching"] = self._latching(names)
+            following["latching"] = self._latching(names)
         for name, given in (
             ("flow_scale", flow_scale),
             ("force_std", force_std),
             ("drag_coefficient", drag_coefficient),
         ):
             if given is not None:
-                wishes[name] = values = self._one_each(name, given).astype(np.float64)
+                following[name] = values = self._one_each(name, given).astype(np.float64)
                 if not (np.isfinite(values) & (values >= 0)).all():
                     raise InputError(f"{name}: expected finite numbers from 0 on")
-        self._wishes = _Settings(**wishes)
+        self._next_settings = _Settings(**following)
 
     def advance(self, duration_s: float) -> None:
         """Let all worlds go on for a while.
@@ -264,8 +264,8 @@ class TankBatch:
         while steps > 0:
             into = self._batch.step % self._steps_per_interval
             if into == 0:
-                self._settings = self._wishes
-            waits = self._settings is not self._wishes
+                self._settings = self._next_settings
+            waits = self._settings is not self._next_settings
             now = min(steps, self._steps_per_interval - into) if waits else steps
             settings = self._settings._asdict()
             settings["flow"] = np.where(self._resting, np.int32(-1), self._settings.flow)
@@ -325,9 +325,11 @@ class TankBatch:
         taken = copy(self)
         taken._batch = self._batch.take(index.tolist(), keys)
         taken._settings = _Settings(*(values[index] for values in self._settings))
-        wait = self._settings is not self._wishes
-        taken._wishes = (
-            _Settings(*(values[index] for values in self._wishes)) if wait else taken._settings
+        wait = self._settings is not self._next_settings
+        taken._next_settings = (
+            _Settings(*(values[index] for values in self._next_settings))
+            if wait
+            else taken._settings
         )
         taken._outcome, taken._resting = self._outcome[index], self._resting[index]
         return taken
@@ -423,7 +425,7 @@ class TankBatch:
         side = self._study.block.side_m
         off = np.hypot(apart[..., 0], apart[..., 1]) + math.sqrt(0.5) * side * turned
         world, block = np.unravel_index(off.argmax(), off.shape)
-        if off.max() > START_POLICY.off_lattice * side:
+        if off.max() > START_ASSEMBLY.off_lattice * side:
             raise InputError(
                 f"start: a corner of block {block} of world {world} is {off.max():.3g} m off the "
                 "place that the lattice of its assembly gives it: check assembly, cell and quarter"

@@ -29,7 +29,7 @@ from driftwalk.comparison.aspects import (
 from driftwalk.conditions import Conditions
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import map_in_threads
-from driftwalk.core.progress import Progress, tell_nobody
+from driftwalk.core.progress import Progress, ignore_progress
 from driftwalk.core.random_streams import trial_in, world_keys
 from driftwalk.motion import MotionModel, Worlds
 from driftwalk.motion.score import broken_worlds
@@ -251,7 +251,7 @@ def search_minimum(
     >>> bool(np.abs(found.best - 0.3).max() < 0.01)
     True
     """
-    return _Search(objective, parameters, budget or Budget(), seed, tell or tell_nobody).run()
+    return _Search(objective, parameters, budget or Budget(), seed, tell or ignore_progress).run()
 
 
 @dataclass

@@ -26,7 +26,7 @@ from driftwalk.conditions.camera import study_as_seen
 from driftwalk.core.arrays import Floats
 from driftwalk.core.calibration_stages import CALIBRATION_STAGES
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.core.random_streams import RecoveryStream
 from driftwalk.model import Study, apply_overrides
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel, known_values, simulate_motion
@@ -115,7 +115,7 @@ class ModelRecovery(EstimationMethod["xr.Dataset"]):
     def check(self) -> None:
         """Refuse true values that no calibration finds, and recordings that cannot be made."""
         if isinstance(self.model, BlockModel):
-            raise InputError("the block has a recovery study of its own: see recovery_study")
+            raise InputError("the block has its own recovery study: see recovery_study")
         if not self.model.parameters:
             raise ConfigurationError(
                 f"all parameters of the model {self.model.name} are known: leave one open"
@@ -151,7 +151,7 @@ class ModelRecovery(EstimationMethod["xr.Dataset"]):
         store: Store | None = None,
         threads: int | None = None,
         executor: Executor | None = None,
-        tell: Tell = tell_nobody,
+        tell: Tell = ignore_progress,
     ) -> xr.Dataset:
         """Calibrate one recording after the other here, or several on other workers."""
         # Only work of this process can say how far it is within a recording.
@@ -377,5 +377,5 @@ def recover_model(
     if study is None:
         study = Study() if like is None else study_in_arena(Study(), like)
     return ModelRecovery(study, model, truth, flow, like, body, noise).recover(
-        store=store, threads=threads, executor=executor, tell=tell or tell_nobody
+        store=store, threads=threads, executor=executor, tell=tell or ignore_progress
     )

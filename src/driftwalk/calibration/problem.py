@@ -21,7 +21,7 @@ from driftwalk.conditions import (
 )
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.core.random_streams import trial_in, world_keys
 from driftwalk.motion import BlockModel, Details, MotionModel, Parameter, Scores, score_worlds
 from driftwalk.schema import Track, body_track
@@ -56,7 +56,7 @@ class Execution(NamedTuple):
     executor: Executor | None = None
     """Computes work units elsewhere, with one thread each."""
     stores: Stores = in_memory
-    tell: Tell = tell_nobody
+    tell: Tell = ignore_progress
 
 
 @dataclass(frozen=True, eq=False)

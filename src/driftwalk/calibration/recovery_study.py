@@ -190,8 +190,8 @@ def relative_errors(
 
     Examples
     --------
-    >>> ends = np.array([[[-5.0, 5.0]]])
-    >>> relative_errors(np.array([[0.2]]), np.array([0.0]), ends, ["linear"]).tolist()
+    >>> bounds = np.array([[[-5.0, 5.0]]])
+    >>> relative_errors(np.array([[0.2]]), np.array([0.0]), bounds, ["linear"]).tolist()
     [[0.4]]
     """
     error = np.empty_like(estimate)
@@ -215,9 +215,9 @@ def summary_by_parameter(
 
     Examples
     --------
-    >>> ends = np.array([[[0.9, 1.2]], [[1.1, 1.3]]])
+    >>> bounds = np.array([[[0.9, 1.2]], [[1.1, 1.3]]])
     >>> found = summary_by_parameter(
-    ...     np.array([[0.05], [0.2]]), ends, np.array([[True], [False]]), np.array([1.0]),
+    ...     np.array([[0.05], [0.2]]), bounds, np.array([[True], [False]]), np.array([1.0]),
     ...     confidence=0.9,
     ... )
     >>> found["coverage"].tolist(), found["determined_median_error"].tolist()
@@ -268,8 +268,8 @@ def calibrated_parameters(found: xr.Dataset, parameters: Sequence[Parameter]) ->
         )
         half_width = np.array(
             [
-                interval_half_width(ends, value, one, confidence=confidence)
-                for ends, value, one in zip(interval, estimate, parameters, strict=True)
+                interval_half_width(bounds, value, one, confidence=confidence)
+                for bounds, value, one in zip(interval, estimate, parameters, strict=True)
             ]
         )
         determined = half_width <= DETERMINED.most_half_width
@@ -283,7 +283,7 @@ def calibrated_parameters(found: xr.Dataset, parameters: Sequence[Parameter]) ->
 
 
 def interval_half_width(
-    ends: Floats, value: float, parameter: Parameter, *, confidence: float
+    bounds: Floats, value: float, parameter: Parameter, *, confidence: float
 ) -> float:
     """Return half the 90 % interval over the value, from an interval of another confidence.
 
@@ -295,12 +295,12 @@ def interval_half_width(
     """
     from scipy.special import ndtri
 
-    if not np.isfinite(ends).all():
+    if not np.isfinite(bounds).all():
         return float("nan")
     low, high = (float(parameter.to_coordinate(end)) for end in (parameter.low, parameter.high))
     room = DETERMINED.range_end * (high - low)
-    start, end = (float(one) for one in parameter.to_coordinate(ends))
+    start, end = (float(one) for one in parameter.to_coordinate(bounds))
     if start < low + room or end > high - room:
         return float("inf")
     factor = float(ndtri(0.5 + 0.5 * DETERMINED.confidence) / ndtri(0.5 + 0.5 * confidence))
-    return relative_half_width(float(ends[0]), value, float(ends[1]), parameter, factor=factor)
+    return relative_half_width(float(bounds[0]), value, float(bounds[1]), parameter, factor=factor)

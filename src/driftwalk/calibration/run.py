@@ -33,7 +33,7 @@ from driftwalk.core.calibration_stages import share_of_windows
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.core.processors import run_in_background
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.motion.protocol import ScoresItself
 from driftwalk.schema.answers.facts import taken_keys, taken_names
@@ -202,11 +202,11 @@ def calibrate(
     0.39
     """
     chosen, searched = _study_and_model(model, study, recording)
-    how = Execution(executor, stores or in_memory, tell or tell_nobody)
+    how = Execution(executor, stores or in_memory, tell or ignore_progress)
     if len(searched.parameters) > MOST_PARAMETERS:
         if statistic is not None:
             raise ConfigurationError(
-                f"a statistic of its own is for one or two parameters; {searched.name} has "
+                f"a user's statistic works for one or two parameters; {searched.name} has "
                 f"{len(searched.parameters)}"
             )
         motion = body_motion(recording, chosen, flow=flow, body=body, threads=threads)
@@ -220,7 +220,7 @@ def calibrate(
         recording, chosen, flow_of, model=searched, statistic=statistic, body=body, threads=threads
     )
     stages = GridCalibration(problem, how).run()
-    # A model is not to blame for what it cannot know: inputs taken for right, an unsteady motion.
+    # A model is not rejected for what it cannot know: inputs taken for right, an unsteady motion.
     stationarity = stationarity_of(problem)
     in_tank = isinstance(searched, BlockModel | ParticleModel)
     is_block = isinstance(searched, BlockModel)

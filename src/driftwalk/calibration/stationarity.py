@@ -1,4 +1,4 @@
-"""Whether a recording moves in its second half as in its first, before a model is blamed for it."""
+"""Whether a recording moves in its second half as in its first, before a model is rejected."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def interval_warnings(
         step = float(np.diff(axis).min()) if axis.size > 1 else steps[index]
         for side in (0, -1):
             at_end = np.mean(_close(estimates[:, index], lattice[index][side], step))
-            crowded = at_end > MISFIT.most_at_end
+            crowded = at_end > CALIBRATION_VERDICT.most_at_end
             cut = _close(intervals[index][side], axis[side], step)
             region_cut = bool(_close(border[:, index], axis[side], step).any())
             reaches = f"the interval of the {parameter.label} reaches the end of the"
@@ -158,7 +158,7 @@ def _close(values: Any, end: float, step: float) -> Any:
     return np.abs(values - end) <= min(1e-8 + 1e-5 * abs(end), 1e-3 * step)
 
 
-class MisfitPolicy(NamedTuple):
+class CalibrationVerdictPolicy(NamedTuple):
     """When a calibration is open, and what is looked at where the model is far off."""
 
     recordings: int = 8
@@ -180,7 +180,7 @@ class MisfitPolicy(NamedTuple):
     a whole 90 % interval chance puts as many beyond each end."""
 
 
-MISFIT: Final = MisfitPolicy()
+CALIBRATION_VERDICT: Final = CalibrationVerdictPolicy()
 
 
 def drawn_distance(problem: Problem, bootstrap: Bootstrap) -> float:
@@ -188,7 +188,7 @@ def drawn_distance(problem: Problem, bootstrap: Bootstrap) -> float:
 
     The values are the bootstrap's estimates.
     """
-    count = min(MISFIT.drawn, len(bootstrap.estimates))
+    count = min(CALIBRATION_VERDICT.drawn, len(bootstrap.estimates))
     drawn = bootstrap.estimates[np.linspace(0, len(bootstrap.estimates) - 1, count).astype(int)]
     steps, _ = simulated_steps(problem, list(drawn.T), stage="drawn", replicates=1)
     among = distances_among(problem.statistic, steps, threads=problem.like.threads)
@@ -205,17 +205,19 @@ def step_differences(problem: Problem, point: Sequence[float]) -> list[str]:
 
     if not isinstance(problem.statistic, StepDistance):
         return []
-    table, _ = simulated_steps(problem, point, stage="bootstrap", replicates=MISFIT.recordings)
+    table, _ = simulated_steps(
+        problem, point, stage="bootstrap", replicates=CALIBRATION_VERDICT.recordings
+    )
     said = []
     for name, column, recorded in (
         ("step lengths", table.length, problem.steps[:, 0]),
         ("turning angles", table.angle, problem.steps[:, 1]),
     ):
-        worlds = [row[:pairs] for row, pairs in zip(column, table.pairs, strict=True)]
-        apart = np.median([ks_2samp(recorded, one).statistic for one in worlds])
-        among = np.median([ks_2samp(worlds[0], one).statistic for one in worlds[1:]])
-        if apart > MISFIT.chance * among:
-            own, simulated = (_size(name, one) for one in (recorded, np.concatenate(worlds)))
+        replicates = [row[:pairs] for row, pairs in zip(column, table.pairs, strict=True)]
+        apart = np.median([ks_2samp(recorded, one).statistic for one in replicates])
+        among = np.median([ks_2samp(replicates[0], one).statistic for one in replicates[1:]])
+        if apart > CALIBRATION_VERDICT.chance * among:
+            own, simulated = (_size(name, one) for one in (recorded, np.concatenate(replicates)))
             said.append(
                 f"the {name} differ: their KS distance is {apart:.3f}, between simulations "
                 f"{among:.3f}; half of them are below {own}, of the simulated ones below "
@@ -245,11 +247,13 @@ def undetermined(
     ['the drag is not determined: its interval is 0 to 0.12; record longer, or other motion']
     """
     said = []
-    for one, ends, coordinate in zip(parameters, intervals, point, strict=True):
-        low, high = (float(one.to_value(end)) for end in ends)
-        wide = 0.5 * (high - low) > MISFIT.half_width * abs(float(one.to_value(coordinate)))
+    for one, bounds, coordinate in zip(parameters, intervals, point, strict=True):
+        low, high = (float(one.to_value(end)) for end in bounds)
+        wide = 0.5 * (high - low) > CALIBRATION_VERDICT.half_width * abs(
+            float(one.to_value(coordinate))
+        )
         search = one.coordinates[-1] - one.coordinates[0]
-        if wide and ends[1] - ends[0] > 2.0 * MISFIT.least_share * search:
+        if wide and bounds[1] - bounds[0] > 2.0 * CALIBRATION_VERDICT.least_share * search:
             unit = "" if one.unit == "1" else f" {one.unit}"
             said.append(
                 f"the {one.label} is not determined: its interval is {low:.3g} to {high:.3g}{unit};"
@@ -275,12 +279,12 @@ def fit_disagreements(
     if recording not in str(flow.attrs.get("source", "")).split(", "):
         return []
     said = []
-    for name, ends in intervals.items():
+    for name, bounds in intervals.items():
         of_fit = flow.attrs.get(f"{FIT_PREFIX}{name}")
-        if of_fit is None or not (ends[1] < of_fit[0] or of_fit[1] < ends[0]):
+        if of_fit is None or not (bounds[1] < of_fit[0] or of_fit[1] < bounds[0]):
             continue
         number = PARAMETERS[name]
-        own, other = (f"{low:.3g} to {high:.3g}" for low, high in (ends, of_fit))
+        own, other = (f"{low:.3g} to {high:.3g}" for low, high in (bounds, of_fit))
         said.append(
             f"{number.words} is {own} here and {other} in the fit that made the flow: at most one "
             "of them is right; read the fit's own verdict, or measure the flow"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from driftwalk.cli.options.shared_types import Json, Overwrite, Threads, option
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.calibration import calibration_answer
 from driftwalk.schema.answers.fit import fit_json
@@ -64,7 +64,7 @@ def demo(
 
     _require_own(out)
     recording, study = tank30_recording(), demo_study(quick=quick)
-    tell = tell_nobody if json else print_fit
+    tell = ignore_progress if json else print_fit
     fit, flow = out / FIT, out / FIT / "flow.nc"
     folder = files("driftwalk.datasets") / "tank30_ode_a"
     with as_file(folder / "recording.csv") as path:
@@ -210,7 +210,7 @@ def print_check(fit: dict[str, Any]) -> None:
 
 
 def print_page(page: Path) -> None:
-    """Say what comes next; whoever waits may open the page of the fit meanwhile."""
+    """Say what comes next: the page of the fit can be opened meanwhile."""
     print(f"Its page: {page}")
     # How long it takes stands at the bar below, which measures it.
     print("Next, the paper's method: a map of KS distances in the fitted flow.\n", flush=True)

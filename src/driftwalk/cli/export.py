@@ -32,7 +32,8 @@ def export(
     ],
     out: Annotated[Path, option("--out -o DIR", "New or empty folder to write.")],
     flow: Annotated[
-        Path | None, option("--flow FILE", "Flow field of a study file, or another one for a run.")
+        Path | None,
+        option("--flow FILE", "Flow field for a study file, or in place of a run's own."),
     ] = None,
     seed: Annotated[
         int | None,

@@ -96,7 +96,7 @@ def flow(
     _check_given(given, tracers=tracers)
     resolved = given.study()
     if given.file is None:
-        # Without a study nobody has said how large the tank is: the default one is no answer.
+        # Without a study the size of the tank is not stated: the default one is no answer.
         trajectory = how.load(recording, side=resolved.block.side_m)
         if how.tank == "fit" and not is_stated(resolved, "block.side_m"):
             # The circle was widened by the default side, which the recording does not say.

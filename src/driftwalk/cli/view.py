@@ -59,8 +59,8 @@ def show(source: Source, *, host: str, port: int, open: bool | None) -> None:
         # It holds a token where other machines reach it.
         if "?" in address:
             print_note(
-                "other machines reach this page by its whole address. It is not encrypted: whoever "
-                "can read the network traffic can read the page and its token"
+                "other machines need the whole address to open this page. The connection is not "
+                "encrypted: anyone who can read the network traffic can read the page and its token"
             )
         print_note("Ctrl-C ends it")
         if wanted:
@@ -70,7 +70,7 @@ def show(source: Source, *, host: str, port: int, open: bool | None) -> None:
 
 
 def open_browser(address: str, opener: Callable[[str], bool] | None = None) -> None:
-    """Open the browser in a thread of its own: some systems wait until it is closed."""
+    """Open the browser in a separate thread: some systems wait until it is closed."""
     import threading
     import webbrowser
 

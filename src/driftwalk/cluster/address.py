@@ -200,7 +200,7 @@ def job_options(address: ClusterAddress) -> dict[str, Any]:
     options.setdefault("memory", site("memory") or "2GB")
     options.setdefault("job_name", "driftwalk")
     if address.kind == "oar" and site(OAR_MEMORY) is None:
-        # Sites name it as they like; where nobody says how, memory is not asked for.
+        # Sites name it as they like; where nothing says how, memory is not asked for.
         options.setdefault(OAR_MEMORY, "not_applicable")
     walltime = options.get("walltime") or site("walltime")
     seconds = _seconds(str(walltime)) if walltime else None

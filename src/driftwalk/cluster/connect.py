@@ -18,7 +18,7 @@ import numpy as np
 from driftwalk.cluster.address import ClusterAddress, begin_jobs
 from driftwalk.core.errors import ClusterError, InputError, reason_of
 from driftwalk.core.extras import show_dask
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.core.provenance import package_versions
 from driftwalk.flow import uniform_flow
 from driftwalk.model import Study, Tank
@@ -164,7 +164,7 @@ class Cluster:
         return "; ".join([*said, "the result is the same"]) if said else ""
 
     def let_go(self) -> None:
-        """Hear no more of the workers: a scheduler that ends has nobody to tell, and complains."""
+        """Hear no more of the workers: a scheduler that ends would only complain."""
         # Where it is gone already nothing is to be said.
         with suppress(Exception):
             self._client.unsubscribe_topic("all")
@@ -206,7 +206,7 @@ def connect(address: ClusterAddress, *, say: Say | None = None) -> Iterator[Clus
     ...     found = dw.assemble(dw.Study(), dw.tank30_flow(), executor=cluster.executor)
     """
     _require_dask()
-    say = say if say is not None else tell_nobody
+    say = say if say is not None else ignore_progress
     with ExitStack() as stack:
         stack.enter_context(_quiet())
         client = stack.enter_context(_client(address, stack))

@@ -253,7 +253,7 @@ class TiePolicy(NamedTuple):
     """How many points may be tied."""
 
     one_in: int = 20
-    """One point in so many may be tied before a warning: 5 %; chosen by hand."""
+    """One point in this many may be tied before a warning: 5 %; chosen by hand."""
 
 
 TIED: Final = TiePolicy()

@@ -15,7 +15,7 @@ from driftwalk.conditions.camera import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.record import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.schema import Track, body_names, body_track
-from driftwalk.schema.outliers import mistakes_warning, without_far_outliers
+from driftwalk.schema.outliers import outliers_warning, without_far_outliers
 from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
@@ -236,7 +236,7 @@ def jump_warnings(
 
 
 def sound_track(recording: xr.Dataset, body: str | None = None) -> tuple[Track, list[str]]:
-    """Return a body's track without the mistakes of its tracker, and what to say of them.
+    """Return a body's track without its outliers, and what to say of them.
 
     Parameters
     ----------
@@ -255,5 +255,5 @@ def sound_track(recording: xr.Dataset, body: str | None = None) -> tuple[Track, 
     seen = body_track(recording, body)
     track = without_far_outliers(seen)
     wrong = seen.time.size - track.time.size
-    said = [mistakes_warning(wrong, seen.time.size)] if wrong else []
+    said = [outliers_warning(wrong, seen.time.size)] if wrong else []
     return track, [*said, *jump_warnings(recording, body, track=track)]

@@ -61,7 +61,7 @@ def share_of_map(done: Iterable[float]) -> float:
 
 
 def share_of_windows(done: Iterable[float]) -> float:
-    """Return how much of a search through windows is done, whose number nobody knows before.
+    """Return how much of a search through an unknown number of windows is done.
 
     Each finished window takes half of what was left, and the window under way its part of the next
     half: the share never goes back.

@@ -95,7 +95,7 @@ class ClusterError(DriftwalkError, RuntimeError):
 def argument_text(name: str, value: str | Mapping[str, str]) -> str:
     """Return an argument and its value as a message names them: in backquotes, the value as JSON.
 
-    A message of the library speaks to whoever called a Python function. The command line finds
+    A message of the library speaks to the caller of a Python function. The command line finds
     these texts and prints its options in their place, so they have one form.
 
     A text that is the same in every message can stand there as it is. This function is for a value

@@ -113,7 +113,7 @@ Result = TypeVar("Result")
 
 
 class Cancelled(Exception):
-    """Ends work whose result nobody waits for any more."""
+    """Ends work whose result is no longer needed."""
 
 
 class CancelOnError:
@@ -136,7 +136,7 @@ class CancelOnError:
             self._cancelled.set()
 
     def raise_if_cancelled(self) -> None:
-        """Raise `Cancelled` where nobody waits any more; the work calls it often."""
+        """Raise `Cancelled` where the result is no longer needed; the work calls it often."""
         if self._cancelled.is_set():
             raise Cancelled
 

@@ -1,4 +1,4 @@
-"""How far long work is: what it calls, and one course through several stages."""
+"""Progress of long work: the callback, and one share over several stages."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Final
 Progress = Callable[[int, int], None]
 """Called with how much is done, and with all of it."""
 WHOLE: Final = 1000
-"""A `Course` counts in thousandths of the work."""
+"""A `StagedProgress` counts in thousandths of the work."""
 USUAL_SHARE: Final = 0.75
 """A search of unknown length goes evenly up to this share of the usual one; chosen by hand."""
 
 
 def share_of_search(done: float) -> float:
-    """Return how much of a search is done whose length nobody knows before.
+    """Return how much of a search of unknown length is done.
 
     Up to three quarters of the usual length it is what is done over that; then it goes on ever more
     slowly, and never comes to its end.
@@ -23,7 +23,7 @@ def share_of_search(done: float) -> float:
     Parameters
     ----------
     done : float
-        Work done over that of a usual search.
+        Work done, over the work of a usual search.
 
     Examples
     --------
@@ -36,7 +36,7 @@ def share_of_search(done: float) -> float:
     return 1.0 - left**2 / (left + done - USUAL_SHARE)
 
 
-class Course:
+class StagedProgress:
     """How far work of several stages is: one share of all of it, which never goes back.
 
     Parameters
@@ -48,13 +48,13 @@ class Course:
 
     Examples
     --------
-    >>> course = Course(print, {"fit": 3.0, "check": 1.0})
-    >>> fit = course.stage("fit")
+    >>> staged = StagedProgress(print, {"fit": 3.0, "check": 1.0})
+    >>> fit = staged.stage("fit")
     >>> fit(1, 2)
     375 1000 fit
     >>> fit(0, 2, "once more")
     375 1000 once more
-    >>> course.begin("check")
+    >>> staged.begin("check")
     750 1000 check
     """
 
@@ -92,5 +92,5 @@ class Course:
         self.stage(name)(0, 1)
 
 
-def tell_nobody(*_: object) -> None:
-    """Leave progress unsaid: what long work calls where nobody asks how far it is."""
+def ignore_progress(*_: object) -> None:
+    """Ignore progress: the default callback of long work."""

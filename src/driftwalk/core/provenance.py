@@ -58,7 +58,7 @@ def manifest(
 ) -> dict[str, Any]:
     """Describe how results are made, in types that JSON has.
 
-    Call it before the work: the hashes are then those of the files that were read.
+    Call it before the work: the hashes then belong to the files that were read.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ class StudySettings(ModelSettings, total=False):
 
 
 class CalibrationSettings(ModelSettings, total=False):
-    """The same for a calibration, where seed and replicates are those of its simulations."""
+    """The same for a calibration, where seed and replicates belong to its simulations."""
 
     duration: Annotated[Number, "simulation.duration_s"]
     seed: Annotated[int, "calibration.seed"]
@@ -57,7 +57,7 @@ class CalibrationSettings(ModelSettings, total=False):
 
 
 class AssemblySettings(ModelSettings, total=False):
-    """The same for self-assembly, where seed, duration and confidence are those of its runs."""
+    """The same for self-assembly, where seed, duration and confidence belong to its runs."""
 
     replicates: Annotated[int, "simulation.replicates"]
     blocks: Annotated[int, "assembly.blocks"]
@@ -136,7 +136,7 @@ SENSITIVITY_KEYS: Final[dict[str, str]] = {
     "realisations": "sensitivity.reference_realisations",
     "seed": "sensitivity.seed",
 }
-"""The same for a sensitivity analysis, where runs are those of a setting."""
+"""The same for a sensitivity analysis, where runs are counted per setting."""
 FLOW_KEYS: Final[dict[str, str]] = {
     **STUDY_KEYS,
     "cells": "flow.cells",

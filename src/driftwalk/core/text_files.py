@@ -22,7 +22,7 @@ MIB: Final = 1 << 20
 
 
 def read_bounded(path: str | Path, *, most: int) -> bytes:
-    """Return the content of a file that holds at most so many bytes.
+    """Return the content of a file of limited size.
 
     Parameters
     ----------

@@ -276,7 +276,7 @@ class Uncertain(NamedTuple):
 def split_uncertain(text: str) -> Uncertain | None:
     """Return the two quantities of a text; nothing where it states no standard deviation.
 
-    A unit at the end is that of both.
+    A unit at the end belongs to both.
 
     Examples
     --------

@@ -240,7 +240,7 @@ class _Painter:
         return np.asarray(self.cv2.convertScaleAbs(self.cv2.max(image, 0.0)), dtype=np.uint8)
 
     def _noise_of(self, index: int) -> Singles:
-        """Return the noise of a frame: a stretch of the drawn noise, from a place of its own."""
+        """Return the noise of a frame: a stretch of the drawn noise, from its own place."""
         size = self.tank.size
         generator = np.random.default_rng([self.settings.seed, VideoStream.IMAGE, index])
         start = int(generator.integers(self.noise.size - size))

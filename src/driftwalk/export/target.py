@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class Source:
     seed: int | None = None
     replicate: int | None = None
     speed: float | None = None
-    tell: Callable[[str], None] = tell_nobody
-    progress: Callable[[int, int], None] = tell_nobody
+    tell: Callable[[str], None] = ignore_progress
+    progress: Callable[[int, int], None] = ignore_progress
 
 
 @dataclass(frozen=True)

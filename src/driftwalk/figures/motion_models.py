@@ -52,15 +52,15 @@ def model_calibration_figures(model_calibration: xr.Dataset) -> Figures:
     """
     found = require_kind(model_calibration, "model_calibration")
     figures: Figures = {"quality": lambda: quality_figure(found)}
-    if "draws" in found:
+    if "posterior_sample" in found:
         figures["pairs"] = lambda: pairs_figure(found)
-    if "profile_misfit" in found:
+    if "profile_discrepancy" in found:
         figures["profiles"] = lambda: profiles_figure(found)
     return figures
 
 
 def pairs_figure(calibration: xr.Dataset) -> Figure:
-    """Return the draws of each pair of parameters, with those of each on the diagonal."""
+    """Return the draws of each pair of parameters, with each parameter's on the diagonal."""
     from matplotlib.ticker import MaxNLocator
 
     names = [str(name) for name in calibration["parameter"].values]
@@ -96,7 +96,7 @@ def pairs_figure(calibration: xr.Dataset) -> Figure:
 
 
 def profiles_figure(calibration: xr.Dataset) -> Figure:
-    """Return how the misfit rises along each parameter, the others at their best."""
+    """Return how the discrepancy rises along each parameter, the others at their best."""
     from scipy.stats import chi2
 
     names = [str(name) for name in calibration["parameter"].values]
@@ -111,10 +111,10 @@ def profiles_figure(calibration: xr.Dataset) -> Figure:
     for ax in axes[len(names) :]:
         ax.set_visible(False)
     for ax in axes[::across]:
-        ax.set_ylabel("rise of the misfit")
+        ax.set_ylabel("rise of the discrepancy")
     figure.suptitle(
-        f"{model_words(calibration.attrs['model'])}: misfit along each parameter, the others at "
-        f"their best (orange: estimate, dashed: interval, grey: {percent(confidence)} level)"
+        f"{model_words(calibration.attrs['model'])}: discrepancy along each parameter, the others "
+        f"at their best (orange: estimate, dashed: interval, grey: {percent(confidence)} level)"
     )
     return figure
 
@@ -138,7 +138,7 @@ def _plot_one(calibration: xr.Dataset, index: int, ax: Axes) -> None:
     """Draw the histogram of a parameter's draws, its interval and its estimate."""
     one = calibration.isel(parameter=index)
     look: dict[str, Any] = {"color": style.PALE, "ec": style.MUTED, "lw": 0.8}
-    ax.hist(one["draws"].values, bins=24, histtype="stepfilled", **look)
+    ax.hist(one["posterior_sample"].values, bins=24, histtype="stepfilled", **look)
     _plot_answer(one, ax)
     ax.set_yticks([])
     ax.xaxis.set_major_locator(_few_ticks())
@@ -147,7 +147,7 @@ def _plot_one(calibration: xr.Dataset, index: int, ax: Axes) -> None:
 def _plot_profile(calibration: xr.Dataset, index: int, level: float, ax: Axes) -> None:
     """Draw a parameter's profile, the level of the interval, and the interval of the draws."""
     one = calibration.isel(parameter=index)
-    ax.plot(one["profile_value"].values, one["profile_misfit"].values, color=style.BLUE)
+    ax.plot(one["profile_value"].values, one["profile_discrepancy"].values, color=style.BLUE)
     ax.axhline(level, color=style.MUTED, lw=0.8)
     _plot_answer(one, ax)
     # Three standard deviations.
@@ -184,7 +184,14 @@ def _width(one: xr.Dataset) -> str:
 def _plot_pair(calibration: xr.Dataset, column: int, row: int, ax: Axes) -> None:
     """Draw the draws of two parameters and the estimate."""
     across, up = (calibration.isel(parameter=index) for index in (column, row))
-    ax.plot(across["draws"].values, up["draws"].values, ".", ms=1.2, color=style.BLUE, alpha=0.6)
+    ax.plot(
+        across["posterior_sample"].values,
+        up["posterior_sample"].values,
+        ".",
+        ms=1.2,
+        color=style.BLUE,
+        alpha=0.6,
+    )
     ax.plot(
         float(across["estimate"]), float(up["estimate"]), "+", ms=5.0, mew=1.2, color=style.ORANGE
     )
@@ -321,7 +328,7 @@ def _plot_aspects(comparison: xr.Dataset, ax: Axes) -> None:
 
 
 def _plot_checks(comparison: xr.Dataset, ax: Axes) -> None:
-    """Draw facts that were not fitted, over those of the recording."""
+    """Draw facts that were not fitted, over the recording's."""
     for index, (one, (color, marker)) in enumerate(_first(comparison)):
         plot_check_ratios(one, ax, color=color, marker=marker, shift=0.2 * (index - 1))
     label_checks(comparison.isel(model=slice(len(LOOKS))), ax)

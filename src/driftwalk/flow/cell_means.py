@@ -122,8 +122,8 @@ def _sum_by(group: Indices, values: Floats, groups: int) -> Floats:
 
 def _jackknife(without: Floats, group: Indices, size: Indices) -> Floats:
     """Return the jackknife standard error of each group, NaN for groups of fewer than two."""
-    lonely = size[group] < 2
-    without = np.where(lonely[:, None], 0.0, without)
+    single = size[group] < 2
+    without = np.where(single[:, None], 0.0, without)
     mean = _sum_by(group, without, size.size) / size[:, None]
     spread = _sum_by(group, (without - mean[group]) ** 2, size.size)
     error = np.sqrt(spread * ((size - 1) / size)[:, None])

@@ -166,7 +166,9 @@ def _from_rows(
 ) -> xr.Dataset:
     """Return the field of a file that has a row for each node."""
     if options.variables:
-        raise InputError("`variables` are those of a NetCDF file, and this is none: leave them out")
+        raise InputError(
+            "`variables` name the variables of a NetCDF file, and this is not one: leave them out"
+        )
     si = raw_to_si(read_raw(path, said), options)
     field = grid_rows(si.rows)
     attrs = {**attrs, "reading": si.reading, **_warning(si.notes)}

@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.progress import Course, share_of_search, tell_nobody
+from driftwalk.core.progress import StagedProgress, ignore_progress, share_of_search
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.series import Series
@@ -109,7 +109,7 @@ def fit_motion(
         A `trajectory`, or several of the same block in the same tank and flow.
     study : Study, optional
         Block, tank, water, force interval and the section [fit]; default: the paper's. With
-        switching times there each interval has a flow of its own, see `fitted_flow`.
+        switching times there each interval has its own flow, see `fitted_flow`.
     angle : {"auto", "state", "given", "none"}, optional
         How the recorded orientation is used; default: what the study says.
     body : str, optional
@@ -165,13 +165,13 @@ def fit_motion(
         spline = passes.spline
         starts = _starts(ready, spline, before)
         assumptions = _assumptions(ready, before)
-        course = Course(
-            tell or tell_nobody, _usual_parts(passes, interaction=chosen.fit.interaction)
+        staged = StagedProgress(
+            tell or ignore_progress, _usual_parts(passes, interaction=chosen.fit.interaction)
         )
         reason = reason_of_no_solution(ready.wall_share, ready.tracks, chosen)
         # The stages stay in one function: they share most of their variables.
         with solved(reason):
-            passed = _work_listener(course, _usual_search(passes))
+            passed = _work_listener(staged, _usual_search(passes))
             search = ModeSearch(passes, ready.prior, chosen.fit.iterations, passed)
             wanted, known = chosen.fit.flow_modes, ready.earlier
             weights = first_weights(ready.tracks, spline) if known is None else known.weights
@@ -198,22 +198,22 @@ def fit_motion(
                     modes = modes_at(laws.search, law.base, shape, wanted)
                     done = modes.start is None
             passes = search.passes
-            course.begin("drag")
+            staged.begin("drag")
             law, restricted = _restricted(search, laws, law)
         require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, reason)
         with solved(reason):
             innovations = passes.innovations(restricted.point)
         if ready.angle == "state":
-            course.begin("angle as given")
+            staged.begin("angle as given")
         turning = _turning_facts(ready, starts, search, law.mode, restricted)
         with solved(reason):
             parameters = _parameter_facts(search, law.mode, restricted, ready)
-            for rival in law.rivals:
-                parameters = _with_rival(parameters, search, rival, ready)
+            for alternative in law.alternatives:
+                parameters = _with_alternative(parameters, search, alternative, ready)
             shape = laws.confounders.shape_change(law.mode)
         with solved(reason):
             stirring = (
-                shared_stirring(ready, restricted.point, course)
+                shared_stirring(ready, restricted.point, staged)
                 if before is None or earlier is None
                 else glued_stirring(ready, law.mode, restricted.point, before, earlier)
             )
@@ -227,7 +227,7 @@ def fit_motion(
             **whiteness_of(innovations)._asdict(),
             **ready.facts,
             **_search_facts(law, restricted),
-            **_agreement(ready, law.mode, restricted),
+            **_measured_flow_facts(ready, law.mode, restricted),
             "wetted_depth_m": chosen.wetted_depth_m,
         }
         fit = build_fit(ready, law, restricted, facts)
@@ -336,15 +336,16 @@ def _law_search(
 
 def _of_all_samples(law: LawResult, search: ModeSearch) -> LawResult | None:
     """Return a law of thinned samples with the modes of all, None if its own does not converge."""
-    mode, *rivals = (
-        search.find(one.point, one.weights, held=FROM_THINNED) for one in (law.mode, *law.rivals)
+    mode, *alternatives = (
+        search.find(one.point, one.weights, held=FROM_THINNED)
+        for one in (law.mode, *law.alternatives)
     )
     if mode is None or not mode.converged:
         return None
-    known = tuple(one for one in rivals if one is not None and one.converged)
+    known = tuple(one for one in alternatives if one is not None and one.converged)
     base = mode if law.base is law.mode else law.base
-    noted = law.noted if len(known) == len(rivals) else ()
-    return replace(law, mode=mode, base=base, rivals=known, noted=noted)
+    noted = law.noted if len(known) == len(alternatives) else ()
+    return replace(law, mode=mode, base=base, alternatives=known, noted=noted)
 
 
 def _parameter_facts(
@@ -364,12 +365,12 @@ def _parameter_facts(
     }
 
 
-def _with_rival(
-    facts: dict[str, Any], search: ModeSearch, rival: Mode, ready: PreparedRecordings
+def _with_alternative(
+    facts: dict[str, Any], search: ModeSearch, alternative: Mode, ready: PreparedRecordings
 ) -> dict[str, Any]:
-    """Return the facts with intervals that hold those of another law as well."""
+    """Return the facts with intervals extended over another law's."""
     try:
-        other = _parameter_facts(search, rival, restricted_drag(search, rival), ready)
+        other = _parameter_facts(search, alternative, restricted_drag(search, alternative), ready)
     except BREAKDOWN:
         return facts
     shared = {
@@ -383,7 +384,9 @@ def _with_rival(
     }
 
 
-def _agreement(ready: PreparedRecordings, mode: Mode, restricted: Restricted) -> dict[str, Any]:
+def _measured_flow_facts(
+    ready: PreparedRecordings, mode: Mode, restricted: Restricted
+) -> dict[str, Any]:
     """Return how far the measured flow and the motion agree; nothing without a measured flow."""
     if ready.measured is None:
         return {}
@@ -467,14 +470,14 @@ def _usual_parts(passes: Passes, *, interaction: bool) -> dict[str, float]:
     return parts
 
 
-def _work_listener(course: Course, usual: float) -> Passed:
+def _work_listener(staged: StagedProgress, usual: float) -> Passed:
     """Return a listener to the work of the search, whose length is unknown beforehand."""
-    said, done = course.stage("likelihood"), 0.0
+    said, done = staged.stage("likelihood"), 0.0
 
     def passed(work: float) -> None:
         nonlocal done
         done += work
         said(share_of_search(done / usual), 1)
 
-    course.begin("likelihood")
+    staged.begin("likelihood")
     return passed

@@ -103,8 +103,8 @@ def cut_track(track: Track, intervals: Intervals, *, fewest: int, where: str) ->
     for time in intervals.times:
         if not first < time <= last:
             raise InputError(
-                f"{where}the switching time {time:g} s is outside the recording, which goes from "
-                f"{first:g} s to {last:g} s: switching times are those of its own clock "
+                f"{where}the switching time {time:g} s is outside the recording ({first:g} s to "
+                f"{last:g} s): give switching times on the recording's own clock "
                 "(`fit.switching_times_s`)"
             )
     index = intervals.index_of(track.time)

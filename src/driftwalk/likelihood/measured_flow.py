@@ -251,8 +251,8 @@ def _layers(field: xr.Dataset, mean: str, mode: str) -> Floats:
 def _require_measurement(field: xr.Dataset, study: Study, sources: tuple[str, ...]) -> None:
     if study.fit.switching_times_s:
         raise InputError(
-            "a measured flow is that of one setting of the pumps: fit each interval between the "
-            f"switching times by itself, with its flow ({argument_text('flow', 'FILE')})"
+            "a measured flow holds for one setting of the pumps: fit each interval between the "
+            f"switching times separately, with its own flow ({argument_text('flow', 'FILE')})"
         )
     method, source = (str(field.attrs.get(name, "")) for name in ("method", "source"))
     if "likelihood" in method:

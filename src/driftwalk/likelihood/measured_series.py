@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
-class SeriesPolicy(NamedTuple):
+class FlowChangePolicy(NamedTuple):
     """When frames are those of a steady flow, and which of their modes a fit takes."""
 
     most_change: float = 0.05
@@ -48,7 +48,7 @@ class SeriesPolicy(NamedTuple):
     """Frames that the spread of all nodes counts in that of one node. Chosen by hand."""
 
 
-SERIES: Final = SeriesPolicy()
+FLOW_CHANGE: Final = FlowChangePolicy()
 
 
 def compressed(field: xr.Dataset, study: Study, *, duration: float = 0.0) -> xr.Dataset:
@@ -79,7 +79,7 @@ def compressed(field: xr.Dataset, study: Study, *, duration: float = 0.0) -> xr.
     squares = (off**2).sum(axis=(0, 1)) / 2.0
     degrees = np.maximum(number - len(layers), 0)
     pooled = float(squares[there].sum() / max(degrees[there].sum(), 1))
-    variance = (SERIES.pooled * pooled + squares) / (SERIES.pooled + degrees)
+    variance = (FLOW_CHANGE.pooled * pooled + squares) / (FLOW_CHANGE.pooled + degrees)
     error = np.where(there, np.sqrt(variance / counts), np.nan)
     found = build_flow_field(
         field["x"].values, field["y"].values, u=layers[0, 0], v=layers[0, 1],
@@ -159,19 +159,23 @@ def _principal(off: Floats, mean: Floats) -> Floats:
     for power in np.maximum(powers[::-1], 0.0):
         edge = math.sqrt(left / changes.size) * (math.sqrt(frames) + math.sqrt(values))
         share = math.sqrt(power / changes.size) / flow
-        if share <= SERIES.least_change or math.sqrt(power) <= SERIES.above_noise * edge:
+        if share <= FLOW_CHANGE.least_change or math.sqrt(power) <= FLOW_CHANGE.above_noise * edge:
             break
         shares.append(share)
         left = max(left - float(power), 0.0)
-    if not shares or shares[0] <= SERIES.most_change:
+    if not shares or shares[0] <= FLOW_CHANGE.most_change:
         return np.zeros((0, frames))
-    if len(shares) > SERIES.most_modes and shares[SERIES.most_modes] > SERIES.most_left:
+    if (
+        len(shares) > FLOW_CHANGE.most_modes
+        and shares[FLOW_CHANGE.most_modes] > FLOW_CHANGE.most_left
+    ):
         raise InputError(
             f"the measured flow changes in time in {len(shares)} modes, and the fit takes "
-            f"{SERIES.most_modes}: the next one is {in_percent(shares[SERIES.most_modes])} of the "
-            "flow; fit a part of the time in which it changes less"
+            f"{FLOW_CHANGE.most_modes}: the next one is "
+            f"{in_percent(shares[FLOW_CHANGE.most_modes])} of the flow; fit a part of the time in "
+            "which it changes less"
         )
-    largest = vectors[:, ::-1][:, : min(len(shares), SERIES.most_modes)]
+    largest = vectors[:, ::-1][:, : min(len(shares), FLOW_CHANGE.most_modes)]
     found = (largest if wide else changes @ largest).T
     return np.asarray(found / np.sqrt((found**2).mean(axis=1, keepdims=True)))
 

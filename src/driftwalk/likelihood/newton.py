@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
@@ -36,7 +36,7 @@ FROM_THINNED: Final[Held] = ((1, 2, 3, 4),)
 """At the mode of samples further apart the flow is known all over the track."""
 
 
-class SearchPolicy(NamedTuple):
+class NewtonPolicy(NamedTuple):
     """How far a step goes, and when the search ends."""
 
     most_log_drag_step: float = 0.5
@@ -65,7 +65,7 @@ class SearchPolicy(NamedTuple):
     longest usual search (docs/explanation/likelihood.md)."""
 
 
-SEARCH: Final = SearchPolicy()
+NEWTON: Final = NewtonPolicy()
 
 
 class WorkPolicy(NamedTuple):
@@ -115,7 +115,7 @@ class Mode:
     @property
     def diverged(self) -> bool:
         """Whether the search was given up so far from a maximum that its numbers mean nothing."""
-        return not self.converged and not self.left <= SEARCH.most_left
+        return not self.converged and not self.left <= NEWTON.most_left
 
     def value_of(self, name: str) -> tuple[float, float]:
         """Return a noise or an opened number, and its standard deviation by theory."""
@@ -154,11 +154,11 @@ class ModeSearch:
     prior: Prior
     iterations: int
     """Most steps of a search."""
-    passed: Passed = tell_nobody
+    passed: Passed = ignore_progress
     """Called after every pass of the filter with its work."""
-    close: float = SEARCH.close
+    close: float = NEWTON.close
     """A search ends when its steps are below this part of the standard deviations,"""
-    close_nats: float = SEARCH.close_nats
+    close_nats: float = NEWTON.close_nats
     """and when a whole step would gain less than this [nat]."""
 
     def of(self, series: Sequence[Series]) -> ModeSearch:
@@ -167,12 +167,12 @@ class ModeSearch:
 
     def shortened(self) -> ModeSearch:
         """Return the search with fewer steps, to see whether it comes to an end."""
-        few = min(self.iterations, SEARCH.trial_iterations)
+        few = min(self.iterations, NEWTON.trial_iterations)
         return replace(self, iterations=few, close_nats=math.inf)
 
     def coarse(self) -> ModeSearch:
         """Return a search that ends a little earlier, where another one follows."""
-        return replace(self, close=SEARCH.close_enough, close_nats=math.inf)
+        return replace(self, close=NEWTON.close_enough, close_nats=math.inf)
 
     def find(self, start: Point, weights: Weights, *, held: Held = FROM_AFAR) -> Mode | None:
         """Return the mode; None where the search breaks down, as under a wrong law it may."""
@@ -219,7 +219,7 @@ class ModeSearch:
                         break
                     # Of a fast camera the flow is brought to its end without the noises, where
                     # steps that shrink as the last one did leave little to them.
-                    left_over = SEARCH.left_over * self.close * before
+                    left_over = NEWTON.left_over * self.close * before
                     settled = pooled and free and near < self.close and near**2 < left_over
         except BREAKDOWN:
             return None
@@ -281,7 +281,7 @@ def limited(step: Floats, drag: int, opened: Sequence[str] = ()) -> Floats:
     angle are another matter: they may be known from their priors alone, which are those of
     logarithms.
     """
-    shorter = step * min(1.0, SEARCH.most_log_drag_step / max(abs(float(step[drag])), 1e-300))
+    shorter = step * min(1.0, NEWTON.most_log_drag_step / max(abs(float(step[drag])), 1e-300))
     for index, power in ((1, 1.0), (2, 2.0)):
         factor = np.clip(
             1.0 + power * step[drag + index], 1.0 / PRIOR.most_factor, PRIOR.most_factor
@@ -289,7 +289,7 @@ def limited(step: Floats, drag: int, opened: Sequence[str] = ()) -> Floats:
         shorter[drag + index] = math.log(factor) / power
     numbers = step.size - len(opened)
     levers = slice(drag + LEVER, numbers)
-    shorter[levers] = np.clip(step[levers], -SEARCH.most_log_step, SEARCH.most_log_step)
+    shorter[levers] = np.clip(step[levers], -NEWTON.most_log_step, NEWTON.most_log_step)
     for index, name in enumerate(opened, numbers):
         most = NUMBERS[name].most
         shorter[index] = min(max(float(step[index]), -most), most)

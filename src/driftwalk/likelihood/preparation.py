@@ -93,8 +93,8 @@ class PreparedRecordings:
     """How orientations are used."""
     dropped: list[DroppedFrames]
     """Frames of each recording that are missing though the stamps say a constant rate."""
-    mistakes: int
-    """Samples that are left out as mistakes of the tracker."""
+    outliers: int
+    """Samples that are left out as outliers of the track."""
     added: AddedNoise
     """The most that a recording without noise of a camera got."""
     measured: MeasuredFlow | None = None
@@ -114,7 +114,7 @@ class PreparedRecordings:
     @property
     def samples(self) -> int:
         """Number of all samples, with those that are left out."""
-        return sum(one.time.size for one in self.series) + self.mistakes
+        return sum(one.time.size for one in self.series) + self.outliers
 
     @property
     def wall_share(self) -> float:
@@ -166,7 +166,7 @@ class PreparedRecordings:
             "wall_share": self.wall_share,
             "angle": self.angle if self.study.block.body().symmetry else NO_HEADING,
             "samples": self.samples,
-            "mistakes": self.mistakes,
+            "outliers": self.outliers,
             # Left out when the recordings were read: too far away for `max_speed`.
             "jumps_removed": sum(_jumps_removed(one, self.body) for one in many),
             **{f"added_{name}": value for name, value in self.added._asdict().items() if value},
@@ -204,11 +204,11 @@ def prepare(
     wanted = study.fit.angle if angle is None else angle
     tracks, parts, places = [], [], []
     raws: list[Track] = []
-    mistakes, dropped, added = 0, list[DroppedFrames](), AddedNoise(0.0, 0.0)
+    outliers, dropped, added = 0, list[DroppedFrames](), AddedNoise(0.0, 0.0)
     for index, recording in enumerate(many):
         seen, where = body_track(recording, body), prefix_of(recording)
         track = without_outliers(seen)
-        mistakes += seen.time.size - track.time.size
+        outliers += seen.time.size - track.time.size
         require_length(track, study, where=where)
         require_travel(track, study, where=str(recording.attrs.get("source", "")))
         # Smoothing is looked for in the track as recorded: gaps would cut its spectrum.
@@ -250,7 +250,7 @@ def prepare(
         for raw, recording in zip(raws, many, strict=True):
             require_raw(raw, where=prefix_of(recording))
     return PreparedRecordings(
-        many, study, body, tracks, parts, places, intervals, series, used_angle, dropped, mistakes,
+        many, study, body, tracks, parts, places, intervals, series, used_angle, dropped, outliers,
         added, measured,
     )  # fmt: skip
 

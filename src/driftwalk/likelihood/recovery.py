@@ -19,7 +19,7 @@ from driftwalk.calibration.recovery_study import (
 )
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.core.random_streams import RecoveryStream
 from driftwalk.core.units import in_percent
 from driftwalk.flow import random_tank_flow
@@ -153,7 +153,7 @@ class FitRecovery(EstimationMethod["SimulatedTracks"]):
         store: Store | None = None,
         threads: int | None = None,
         executor: Executor | None = None,
-        tell: Tell = tell_nobody,
+        tell: Tell = ignore_progress,
     ) -> xr.Dataset:
         """Fit recordings in processes of this machine, or on other workers."""
         if executor or threads is None:

@@ -200,7 +200,7 @@ def require_own_arena(series: Sequence[Series], study: Study, *, where: str) -> 
         "the body stays in a region too small to find the tank from. State the tank with "
         '`tank="circle:D"`, and check the scale and the side of the block'
         if is_stated(study, "block.side_m")
-        else "the side was not stated, and this is the default. State that of your body with "
+        else "the side was not stated, so this is the default. State the side of your body with "
         "`block.side_m`, and check the scale"
     )
     raise InputError(

@@ -32,16 +32,16 @@ class Starts(NamedTuple):
     """They are tried in this order until a search converges."""
 
 
-class StartPolicy(NamedTuple):
+class InitialValuesPolicy(NamedTuple):
     """Where the search begins."""
 
-    floating_unrest: tuple[float, ...] = (64.0, 4.0, 16.0)
+    floating_intensity_factors: tuple[float, ...] = (64.0, 4.0, 16.0)
     """First values of q under the law of a floating body, as multiples of that under the paper's.
     On small orbits each fails for some bodies, but not for the same ones: of 35 in studies/verdict
     two were not found from 4 alone and one not from 16; 64 found the four hardest."""
 
 
-START: Final = StartPolicy()
+INITIAL_VALUES: Final = InitialValuesPolicy()
 
 
 def first_points(ready: PreparedRecordings, spline: Spline) -> Starts:
@@ -58,7 +58,7 @@ def first_points(ready: PreparedRecordings, spline: Spline) -> Starts:
     flow = _first_coefficients(ready, tracer, spline)
     floating = [
         replace(paper, coefficients=flow, log_intensity=paper.log_intensity + math.log(one))
-        for one in START.floating_unrest
+        for one in INITIAL_VALUES.floating_intensity_factors
     ]
     return Starts(paper, tuple(floating))
 

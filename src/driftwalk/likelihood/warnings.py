@@ -11,7 +11,7 @@ from driftwalk.likelihood.flow_intervals import Intervals
 from driftwalk.likelihood.law.search import LAW
 from driftwalk.likelihood.refuse import LENGTH, LIMIT, in_words, needed_duration
 from driftwalk.schema.answers.facts import is_open
-from driftwalk.schema.outliers import mistakes_warning
+from driftwalk.schema.outliers import outliers_warning
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -105,8 +105,8 @@ def _on_the_likelihood(facts: Mapping[str, Any]) -> Iterator[str]:
         yield (
             f"the search was given up after {facts['iterations']} steps ([fit] iterations), "
             f"{left:.2g} standard deviations from a maximum of the likelihood: this recording does "
-            "not determine the parameters of the model; a motion without random force, as that of "
-            "a driven body, tells nothing of them"
+            "not determine the parameters of the model; a motion without random force, as of a "
+            "driven body, does not determine them"
         )
     if facts["restricted"] == "no":
         yield (
@@ -130,8 +130,8 @@ def _on_the_lever(facts: Mapping[str, Any], most_m: float) -> Iterator[str]:
     if facts.get("force_lever_m_interval", (0.0, 0.0))[0] > most_m:
         yield (
             f"the block turns as if the force acted {1e3 * facts['force_lever_m']:.2g} mm from its "
-            "centre: the recorded angle is late, or not that of the block's faces, "
-            "or something else makes the block turn; C_d and the force may be wrong"
+            "centre: the recorded angle may lag, may not be the angle of the block's faces, or "
+            "something else turns the block; C_d and the force may be wrong"
         )
 
 
@@ -141,17 +141,17 @@ def _on_added_noise(facts: Mapping[str, Any]) -> Iterator[str]:
     if position:
         also = f" and {math.degrees(turning):.2g}°" if turning else ""
         yield (
-            f"the recording has hardly any noise of a camera: {1e3 * position:.2g} mm{also} were "
-            "added, as the filter's approximations of the motion are no more exact; the noise of "
-            "the answer contains them"
+            f"the recording has almost no camera noise: {1e3 * position:.2g} mm{also} were added, "
+            "because the filter's approximations of the motion are no more exact than this; the "
+            "reported noise includes them"
         )
 
 
 def _on_the_data(
     facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals
 ) -> Iterator[str]:
-    if facts["mistakes"]:
-        yield mistakes_warning(facts["mistakes"], facts["samples"])
+    if facts["outliers"]:
+        yield outliers_warning(facts["outliers"], facts["samples"])
     if facts["jumps_removed"]:
         yield (
             f"{facts['jumps_removed']} samples were left out when the recording was read: with "
@@ -206,9 +206,10 @@ def _on_glued_blocks(facts: Mapping[str, Any]) -> Iterator[str]:
     apart = facts.get("stirring_misfit_std", 0.0)
     if apart > WARNING.disagreement_stds:
         yield (
-            "force and torque on the glued blocks say two things of the stirring that they share, "
-            f"{apart:.1f} standard deviations apart: the forces on them are of another kind, or "
-            "one of the two fits is wrong; correlation and length may mean nothing"
+            "force and torque on the glued blocks give two different estimates of the stirring "
+            f"that they share, {apart:.1f} standard deviations apart: the force on them is of "
+            "another kind, or one of the two fits is wrong; do not rely on the correlation and its "
+            "length"
         )
 
 
@@ -219,11 +220,11 @@ def _on_the_search(facts: Mapping[str, Any]) -> Iterator[str]:
         yield (f"the search has not converged in {facts['iterations']} steps ([fit] iterations)")
     elif is_open(facts, "drag_coefficient"):
         yield (
-            "the drag is linear within its uncertainty: the recording does not determine C_d, that "
-            "of the quadratic part alone"
+            "the drag is linear within its uncertainty: the recording does not determine C_d, the "
+            "coefficient of the quadratic part"
             if facts.get("drag_law") == "mixed"
-            else "the recording says less of C_d than the fit assumes of it beforehand (0.5, "
-            "within a factor of two): it does not determine C_d"
+            else "the recording constrains C_d less than the prior does (0.5, within a factor of "
+            "two): it does not determine C_d"
         )
 
 

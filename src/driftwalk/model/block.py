@@ -230,7 +230,7 @@ class Forces(Section):
     """Distance over which blocks share the stochastic force.
 
     Length L of the stochastic force in space: two blocks at a distance r feel forces with the
-    correlation exp(-r^2 / 2 L^2). 0: each block has a force of its own. One block alone feels the
+    correlation exp(-r^2 / 2 L^2). 0: each block has its own force. One block alone feels the
     same with every L.
     """
     stirring: Literal["free", "incompressible"] = "free"

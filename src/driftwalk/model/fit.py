@@ -55,7 +55,7 @@ class Fit(Section):
     """Names of the flows between switching times; repeat a name for a flow that comes back.
 
     Names of the flows in the intervals between the switching times: intervals with the same name
-    have the same flow. Without names all flows differ. Each name has a stochastic force of its own.
+    have the same flow. Without names all flows differ. Each name has its own stochastic force.
     """
     law: Literal["auto", "paper", "quadratic", "linear", "mixed", "power"] = "auto"
     """Drag law.

@@ -149,8 +149,8 @@ class Recording(Section):
     of shares of an image also its size (cxcywh@1920x1080); or no box (none); "auto" goes by their
     names."""
     missing: tuple[str, ...] | None = Field(default=None, examples=['["0,0"]'])
-    """Positions that mean that the body was not seen: "X,Y", a number, or "held" for that of the
-    sample before."""
+    """Positions that mark a body that was not seen: "X,Y", a number, or "held" for the last
+    position repeated."""
     sort: Literal["error", "sort"] = "error"
     """Times that go back: "error" refuses them, "sort" sorts them."""
     max_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=1e4)] = Field(

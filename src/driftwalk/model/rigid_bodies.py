@@ -52,7 +52,7 @@ class RigidBody:
     cells: Floats = field(default_factory=lambda: np.zeros((1, 2)))
     """Centres of its cells, shape (n, 2) [m]."""
     is_square: bool = False
-    """Whether it is the block for which the native core has a kernel of its own."""
+    """Whether it is the block for which the native core has a special kernel."""
 
     @property
     def moment_m2(self) -> float:
@@ -270,7 +270,7 @@ BODIES: Final[dict[str, Callable[[Measures], RigidBody]]] = {
     "disc": disc,
     "rectangle": rectangle,
 }
-"""Shapes by name; any other name is that of a polyomino, or its rows."""
+"""Shapes by name; any other name is a polyomino's, or its rows."""
 
 
 def rigid_body(shape: str, measures: Measures) -> RigidBody:

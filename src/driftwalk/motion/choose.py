@@ -101,7 +101,7 @@ def motion_model(
         Of a function: whether the worlds of a call share one setting of the parameters.
     clearance : float, optional
         Of the family: distance of the recorded point from the wall at contact [m]. Left out, a
-        simulation takes 0 and a calibration that of the recording.
+        simulation takes 0 and a calibration the recording's.
     timeout : float, optional
         Of a program: longest time that an answer may take [s], default 60.
     **choices : tuple or float
@@ -196,7 +196,7 @@ def family_model(
         Parameters of the member with a range, step or scale of their own.
     clearance : float, optional
         Distance of the recorded point from the wall at contact [m]: half the body's width. Left
-        out, a simulation takes 0 and a calibration of many parameters that of the recording.
+        out, a simulation takes 0 and a calibration of many parameters the recording's.
     **choices : float or tuple
         Of the member's parameters by name: a value that is known, or a range ``(low, high)`` or
         ``(low, high, unit)``. The others keep their wide ranges.

@@ -31,9 +31,9 @@ class UserFile:
     """Of the bytes that were run."""
     module: ModuleType
 
-    def blame(self, error: BaseException) -> str:
+    def error_text(self, error: BaseException) -> str:
         """Return an error in words, with the last line of the file that took part in it."""
-        return _blame(self.path, error)
+        return _error_text(self.path, error)
 
 
 def load_user_file(path: Path) -> UserFile:
@@ -62,7 +62,7 @@ def load_user_file(path: Path) -> UserFile:
             exec(compile(source, str(full), "exec", dont_inherit=True), module.__dict__)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
-        raise ConfigurationError(_blame(path, error)) from error
+        raise ConfigurationError(_error_text(path, error)) from error
     return UserFile(path, sha256, module)
 
 
@@ -89,7 +89,7 @@ def _on_the_path(folder: str) -> Iterator[None]:
             sys.path.remove(folder)
 
 
-def _blame(path: Path, error: BaseException) -> str:
+def _error_text(path: Path, error: BaseException) -> str:
     if isinstance(error, SyntaxError) and _same(error.filename, path):
         line = f", line {error.lineno}" if error.lineno else ""
         return f"{path}{line}: {error.msg}"
@@ -215,7 +215,7 @@ def _instance(found: type, file: UserFile, name: str) -> Any:
     try:
         return found()
     except Exception as error:
-        raise ConfigurationError(f"{name}() failed: {file.blame(error)}") from error
+        raise ConfigurationError(f"{name}() failed: {file.error_text(error)}") from error
 
 
 def _require_parameters(model: MotionModel, where: str) -> None:

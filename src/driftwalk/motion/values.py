@@ -44,7 +44,7 @@ def known_values(model: MotionModel, given: Mapping[str, Any]) -> dict[str, floa
     usual = {one.name: one for one in model.parameters}
     for name in given:
         if name not in usual:
-            raise ConfigurationError(_stranger(model, name))
+            raise ConfigurationError(_unknown_parameter_text(model, name))
     missing = [_in_words(one) for one in model.parameters if one.name not in given]
     if missing:
         raise ConfigurationError(
@@ -97,7 +97,7 @@ def estimated_values(found: xr.Dataset, model: MotionModel) -> dict[str, float]:
     return {str(name): float(value) for name, value in values if np.isfinite(value)}
 
 
-def _stranger(model: MotionModel, name: str) -> str:
+def _unknown_parameter_text(model: MotionModel, name: str) -> str:
     fixed: Mapping[str, float] = getattr(model, "fixed", {})
     if name in fixed:
         return f"the model {model.name} was made with {name}={fixed[name]:g}: leave it out"
@@ -149,11 +149,11 @@ def models_knowing(
         own = {key: value for key, value in known.items() if key in has}
         names += [name for name in has if name not in names]
         found.append(motion_model(str(one), **own) if own else one)
-    for stranger in known.keys() - set(names):
+    for unknown in known.keys() - set(names):
         having = f"they have {', '.join(names)}" if names else "the block has keys of the study"
         raise ConfigurationError(
-            f"`parameters` {stranger}: none of the named models has it; {having}"
-            f"{did_you_mean(stranger, names)}"
+            f"`parameters` {unknown}: none of the named models has it; "
+            f"{having}{did_you_mean(unknown, names)}"
         )
     return found
 

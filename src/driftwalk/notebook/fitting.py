@@ -56,12 +56,12 @@ def fit(
     earlier : path-like, xarray.Dataset or EarlierFit, optional
         Of glued blocks, ``body_shape="xx"``: a finished fit of one block in the same water, by its
         run directory, as a `fit` that was read from one or made with `folder`, or with its
-        recordings, ``dw.likelihood.EarlierFit(fit, [recording])``. Tank, side, water and law are
-        those of that fit.
+        recordings, ``dw.likelihood.EarlierFit(fit, [recording])``. Tank, side, water and law come
+        from that fit.
     body : str, optional
         The body, where a recording has several; ``interaction=True`` takes all of them.
     folder : path-like, optional
-        Run directory to make or continue, the same as that of ``driftwalk fit``: fit, flow,
+        Run directory to make or continue, the same as for ``driftwalk fit``: fit, flow,
         recording, check of the model, figures and manifest.
     check : bool
         Whether to check if the model explains the recordings: some seconds. The fit then holds the
@@ -152,13 +152,13 @@ def calibrate(
     body : str, optional
         The body, where the recording has several.
     folder : path-like, optional
-        Run directory to make or continue, the same as that of ``driftwalk calibrate``.
+        Run directory to make or continue, the same as for ``driftwalk calibrate``.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     threads : int, optional
         Default: all processors. The result does not depend on it.
     executor : concurrent.futures.Executor, optional
-        Computes work units elsewhere, such as that of `driftwalk.cluster.connect`. The result does
+        Computes work units elsewhere, for example from `driftwalk.cluster.connect`. The result does
         not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
@@ -257,13 +257,13 @@ def compare_models(
     body : str, optional
         The body, where the recording has several.
     folder : path-like, optional
-        Run directory to make or continue, the same as that of ``driftwalk compare-models``.
+        Run directory to make or continue, the same as for ``driftwalk compare-models``.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     threads : int, optional
         Default: all processors. The result does not depend on it.
     executor : concurrent.futures.Executor, optional
-        Computes work units elsewhere, such as that of `driftwalk.cluster.connect`. The result does
+        Computes work units elsewhere, for example from `driftwalk.cluster.connect`. The result does
         not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.

@@ -55,7 +55,7 @@ def infer_outcomes(
     threads : int, optional
         Default: all processors. The result does not depend on it.
     folder : path-like, optional
-        Run directory to make or continue, the same as that of ``driftwalk infer-outcomes``.
+        Run directory to make or continue, the same as for ``driftwalk infer-outcomes``.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     progress : callable, optional
@@ -115,7 +115,7 @@ def infer_outcomes(
 
 
 YIELD_KEYS = {**ASSEMBLY_KEYS, "seed": "sensitivity.seed"}
-"""The runs of a yield have the seed of those of a sensitivity study."""
+"""The runs of a yield have the same seed as a sensitivity study."""
 
 
 def maximise_yield(
@@ -160,7 +160,7 @@ def maximise_yield(
     indifference : float
         Difference of yields that does not matter, in (0, 1).
     folder : path-like, optional
-        Run directory to make or continue, the same as that of ``driftwalk yield``.
+        Run directory to make or continue, the same as for ``driftwalk yield``.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     threads : int, optional

@@ -257,13 +257,13 @@ def assemble(
     flow : xarray.Dataset, optional
         The water's velocity, a `flow_field`; a fit brings its own.
     folder : path-like, optional
-        Run directory to make or continue, the same as that of ``driftwalk assemble``.
+        Run directory to make or continue, the same as for ``driftwalk assemble``.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     threads : int, optional
         Default: all processors. The result does not depend on it.
     executor : concurrent.futures.Executor, optional
-        Computes work units elsewhere, such as that of `driftwalk.cluster.connect`. The result does
+        Computes work units elsewhere, for example from `driftwalk.cluster.connect`. The result does
         not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
@@ -322,7 +322,7 @@ class FoundModel(NamedTuple):
     uncertainty: xr.Dataset | None
     """The `fit` or `calibration` where parameters can be drawn from it."""
     warnings: tuple[str, ...] = ()
-    """Sentences on what was found, for whoever simulates with it."""
+    """Sentences on what was found, for the user who simulates with it."""
 
 
 def model_of(
@@ -413,7 +413,7 @@ def kinetics(
     seed : int
         Seed of the bootstrap, at least 0.
     folder : path-like, optional
-        Run directory to make or continue, the same as that of ``driftwalk kinetics``.
+        Run directory to make or continue, the same as for ``driftwalk kinetics``.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     progress : callable, optional

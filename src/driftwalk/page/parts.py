@@ -294,7 +294,7 @@ def verdict_paragraphs(
 
 
 def arena_part(dataset: xr.Dataset) -> dict[str, Any] | None:
-    """Return the arena of a dataset as a page has it, None when nobody knows it."""
+    """Return the arena of a dataset as a page has it, None when it is unknown."""
     arena = arena_of(dataset)
     needed = _ARENA_KEYS.get(str(arena.get("shape")))
     if needed is None or any(key not in arena for key in needed):

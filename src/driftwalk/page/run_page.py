@@ -13,7 +13,7 @@ from shlex import quote
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.core.text_files import json_value
 from driftwalk.page import parts
 from driftwalk.page.html import page_frame
@@ -47,7 +47,9 @@ _BESIDE_CONTENT: Final = ("id", "note", "facts", "run")
 """Keys in which two pages may differ about one thing, such as the noise of a recording."""
 
 
-def report_page(folder: str | Path, *, tell: Callable[[str], None] = tell_nobody) -> dict[str, Any]:
+def report_page(
+    folder: str | Path, *, tell: Callable[[str], None] = ignore_progress
+) -> dict[str, Any]:
     """Return the page data of a run directory, finished or not.
 
     Parameters

@@ -188,7 +188,9 @@ def _moments(
         rate = lasts / seconds
     else:
         if not (np.isfinite(speed) and speed > 0.0):
-            raise InputError(f"a film runs so many times real time, above zero: got {speed:g}")
+            raise InputError(
+                f"speed must be positive (playback speed relative to real time), got {speed:g}"
+            )
         count = np.floor(lasts * per_second / speed * (1.0 + 1e-12)) + 1.0
         rate = speed
     if count > MOST_FRAMES:

@@ -288,7 +288,7 @@ def _draw_noise(ax: Axes, check: xr.Dataset) -> None:
         x, y, off, cmap="PuOr_r", norm=CenteredNorm(0.0, halfrange=top), shading="nearest"
     )
     mesh.set_rasterized(True)
-    style.add_colorbar(mesh, ax, "square of the errors, off that of all (sd)")
+    style.add_colorbar(mesh, ax, "squared error, against the mean of all (sd)")
 
 
 def running_time(check: xr.Dataset) -> tuple[Floats, Floats]:

@@ -126,7 +126,7 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_yticks(range(len(order)), words)
     ax.set_ylim(len(order) - 0.4, -0.6)
     ax.locator_params(axis="x", nbins=5)
-    ax.set_xlabel("\n".join(filter(None, ["yield less that of the best", shared])))
+    ax.set_xlabel("\n".join(filter(None, ["yield, less the best one", shared])))
     ax.spines[["top", "right"]].set_visible(False)
     handles, texts = ax.get_legend_handles_labels()
     keys = dict(zip(texts, handles, strict=True))

@@ -144,7 +144,8 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
     }
     if block_side is None:
         notes = [
-            f"the fitted circle (radius {fit.radius:.4g} m) is that of the body's centre, which "
+            f"the fitted circle (radius {fit.radius:.4g} m) is the path of the body's centre, "
+            "which "
             'never reaches the rim: the tank is larger; state it with `tank="circle:D"` if you '
             "know it"
         ]

@@ -8,7 +8,14 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Final
 
-from driftwalk.record.vocabulary import ALLOWED, IMAGE_WORDS, NO_UNIT, ROOTS, UNITS, words
+from driftwalk.record.unit_and_column_words import (
+    ALLOWED,
+    IMAGE_WORDS,
+    NO_UNIT,
+    ROOTS,
+    UNITS,
+    words,
+)
 
 QUATERNION: Final = ("qx", "qy", "qz", "qw")
 OF_BODY: Final = ("x", "y", "z", "theta", *QUATERNION, "lon", "lat", "confidence")

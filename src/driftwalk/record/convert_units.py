@@ -21,7 +21,7 @@ from driftwalk.record.raw import (
     RawRecording,
     ReadOptions,
 )
-from driftwalk.record.tables.stamps import DAY, LOCAL, UTC, moment_text
+from driftwalk.record.tables.date_stamps import DAY, LOCAL, UTC, moment_text
 
 
 def detect_quantum(values: Array) -> float:

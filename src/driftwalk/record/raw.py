@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats, Integers
-from driftwalk.record.vocabulary import words
+from driftwalk.record.unit_and_column_words import words
 
 NAMELESS: Final = words("nameless") | {""}
 """Words for a missing name of a body."""

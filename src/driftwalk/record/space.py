@@ -207,7 +207,7 @@ def _against(name: str, plane: Plane, height: float, width: float, tilt: Array |
     if leaning > MOST_TILT:
         notes.append(
             f"body '{name}' leans by {math.degrees(leaning):.0f}° as a rule: is `up` right? Its "
-            "angle is that of its own axis that lies in the plane where the body is not turned"
+            "angle is the angle of the body's axis that lies in the plane while the body is upright"
         )
     return notes
 

@@ -26,7 +26,7 @@ from driftwalk.core.arrays import Bools, Codes, Integers
 from driftwalk.core.errors import DAMAGED, FormatError, naming_its_file
 from driftwalk.record.bad_row import check_lines, decoded_line
 from driftwalk.record.raw import MISSING, NAMELESS, Array, TableLayout
-from driftwalk.record.tables.stamps import RowError, StampReader, calendar_of, clock_of_stamps
+from driftwalk.record.tables.date_stamps import RowError, StampReader, calendar_of, clock_of_stamps
 
 UTF16: Final = "UTF-16"
 """Encoding of "Unicode text", which begins with a byte order mark."""

@@ -143,14 +143,14 @@ class AssemblyWork:
 
         settings, table = self.study.assembly, table_hash(self.study)
         drawn = sizes_drawn = None
-        course = run.course(self._usual_parts())
+        staged = run.staged_progress(self._usual_parts())
         how: dict[str, Any] = {"threads": self.threads, "executor": run.executor}
         assembly = assemble(
             self.study,
             self.flow,
             trial=FIXED_TRIAL,
             store=run.store("fixed"),
-            progress=course.stage("runs"),
+            progress=staged.stage("runs"),
             **how,
         )
         assembly = run.keep_result(assembly)
@@ -171,7 +171,7 @@ class AssemblyWork:
                 quantiles=self.quantiles,
                 trial=DRAWN_TRIAL,
                 store=run.store("drawn"),
-                progress=course.stage("runs, drawn parameters"),
+                progress=staged.stage("runs, drawn parameters"),
                 **how,
             )
             run.keep("assembly_drawn.nc", assembly_drawn)
@@ -190,12 +190,12 @@ class AssemblyWork:
                 f"{self.study.interaction.attraction} has changed during the run: start it again"
             )
         path = run.keep("path.nc", path)
-        course.begin("figures")
+        staged.begin("figures")
         run.draw()
         if self.film != "none":
             import driftwalk.plot
 
-            course.begin("film")
+            staged.begin("film")
             film = run.directory.folder("figures") / f"run.{self.film}"
             driftwalk.plot.write_animation(path, film)
         return AssemblyResult(
@@ -329,12 +329,12 @@ class SensitivityWork:
         from driftwalk.assembly import sensitivity_indices, sensitivity_map, sensitivity_reference
 
         # A setting costs the same in each stage.
-        course = run.course({**self.settings, "figures": 0.0})
+        staged = run.staged_progress({**self.settings, "figures": 0.0})
 
         def how(store: str, stage: str) -> dict[str, Any]:
             return {
                 "store": run.store(store),
-                "progress": course.stage(stage),
+                "progress": staged.stage(stage),
                 "threads": self.threads,
                 "executor": run.executor,
             }
@@ -354,7 +354,7 @@ class SensitivityWork:
                 self.study, self.flow, samples=self.samples, **how("sobol", "Sobol")
             )
             indices = run.keep("sobol.nc", indices)
-        course.begin("figures")
+        staged.begin("figures")
         run.draw()
         return SensitivityResult(reference, found, components, indices)
 

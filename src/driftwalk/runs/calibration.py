@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from driftwalk.core.calibration_stages import CALIBRATION_STAGES
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.runs.resumable_run import dataset_hash, naming_recording
 from driftwalk.schema.parameters import unit_suffix
 from driftwalk.schema.runs import run_kind
@@ -116,7 +116,7 @@ class CalibrationWork:
         if self.used_flow is not None:
             run.keep("flow.nc", self.used_flow)
         run.keep("recording.nc", self.recording)
-        tell = run.course({"calibration": 1.0}).stage("calibration")
+        tell = run.staged_progress({"calibration": 1.0}).stage("calibration")
         found = calibrate(
             self.recording,
             self.model,
@@ -142,7 +142,7 @@ def _posterior_table(found: xr.Dataset) -> bytes:
     names, units = found["parameter"].values.tolist(), found["unit"].values.tolist()
     suffixes = [unit_suffix(unit) for unit in units]
     keys = [f"{name}_{end}" if end else name for name, end in zip(names, suffixes, strict=True)]
-    rows = [",".join(map(repr, row)) for row in found["draws"].values.tolist()]
+    rows = [",".join(map(repr, row)) for row in found["posterior_sample"].values.tolist()]
     return "\n".join([",".join(keys), *rows, ""]).encode()
 
 
@@ -183,7 +183,7 @@ class ModelComparisonWork:
     body: str | None
     inputs: Mapping[str, Path]
     threads: int | None = None
-    finished: Callable[[str, float, float, int], None] = tell_nobody
+    finished: Callable[[str, float, float, int], None] = ignore_progress
 
     kind: ClassVar = "model_comparison"
 

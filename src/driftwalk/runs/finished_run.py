@@ -112,7 +112,7 @@ class FoundRun:
         if "flow_force_std" not in self.found:
             return None
         return (
-            f"of the {self.words}: each flow has its own σ_F; that of flow "
+            f"of the {self.words}: each flow has its own σ_F; the one of flow "
             f"{self.found['flow'].values[0]} is taken for all (`flow_settings` gives the others)"
         )
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.runs.finished_run import run_folder
 from driftwalk.runs.resumable_run import dataset_hash
 
@@ -68,8 +68,8 @@ class FitWork:
     wall: bool = False
     flow: xr.Dataset | None = None
     earlier: EarlierFit | None = None
-    fitted: Callable[[xr.Dataset], None] = tell_nobody
-    checked_model: Callable[[xr.Dataset, xr.Dataset | None], None] = tell_nobody
+    fitted: Callable[[xr.Dataset], None] = ignore_progress
+    checked_model: Callable[[xr.Dataset, xr.Dataset | None], None] = ignore_progress
 
     kind: ClassVar = "fit"
     seeds: ClassVar[Mapping[str, int]] = {}
@@ -106,9 +106,9 @@ class FitWork:
             judge_fit,
         )
 
-        course = run.course(self._usual_parts())
-        course.begin("fit")
-        tell = course.stage("fit")
+        staged = run.staged_progress(self._usual_parts())
+        staged.begin("fit")
+        tell = staged.stage("fit")
         found = fit_motion(
             self.recordings,
             self.study,
@@ -124,20 +124,20 @@ class FitWork:
         self.fitted(found)
         check = None
         if self.compare_laws:
-            tell = course.stage("laws")
+            tell = staged.stage("laws")
             found = compare_laws(found, self.recordings, body=self.body, tell=tell)
         if self.wall:
-            tell = course.stage("wall")
+            tell = staged.stage("wall")
             found = estimate_wall(found, self.recordings, body=self.body, tell=tell)
         if self.check:
-            course.begin("check")
+            staged.begin("check")
             found, check = judge_fit(found, self.recordings, body=self.body)
             if check is not None:
                 check = run.keep("check.nc", check)
         # The fit was stored before, so that a kill does not lose it; now with all that was added.
         found = run.keep_result(found)
         self.checked_model(found, check)
-        course.begin("figures")
+        staged.begin("figures")
         run.draw()
         return Fitted(found, check)
 

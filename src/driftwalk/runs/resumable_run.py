@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.progress import Course, tell_nobody
+from driftwalk.core.progress import StagedProgress, ignore_progress
 from driftwalk.schema.description import SOURCE_WARNINGS
 from driftwalk.schema.kinds import find_kind
 from driftwalk.schema.runs import RunContents, run_kind
@@ -34,7 +34,7 @@ class Progress(Protocol):
 
 
 def silent(done: int, total: int, text: str = "") -> None:
-    """Tell nobody how much of a run is done."""
+    """Report no progress."""
 
 
 class Work(Protocol):
@@ -112,9 +112,9 @@ class Run(RunContents):
         """Return the store of a sweep's work units, which a continued run finds again."""
         return self.directory.store(name, fingerprint=fingerprint)
 
-    def course(self, parts: Mapping[str, float]) -> Course:
-        """Return the course of work of several stages, which reports the progress."""
-        return Course(self.progress, parts)
+    def staged_progress(self, parts: Mapping[str, float]) -> StagedProgress:
+        """Return the progress of work of several stages."""
+        return StagedProgress(self.progress, parts)
 
     def draw(self, early: Mapping[str, xr.Dataset] | None = None) -> None:
         """Write all figures of what the run has kept, and of datasets that it has not yet."""
@@ -133,7 +133,7 @@ def run_work(
     folder: Path,
     *,
     overwrite: bool = False,
-    begun: Callable[[], None] = tell_nobody,
+    begun: Callable[[], None] = ignore_progress,
     executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_work(...)",

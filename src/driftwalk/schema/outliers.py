@@ -1,4 +1,4 @@
-"""Outliers of a track: samples that are mistakes of the tracker.
+"""Outliers of a track: samples that the tracker got wrong.
 
 A mistake is an isolated position far from both of its neighbours. No model makes them. The filter
 of a fit leaves out a sample that is far from its prediction, but its search begins with so much
@@ -54,7 +54,7 @@ OUTLIER: Final = OutlierPolicy()
 def outliers_in(
     track: Track, *, least: float = 0.0, longest_gap: float = OUTLIER.longest_gap
 ) -> Bools:
-    """Return which samples of a track are mistakes of the tracker, shape (n,).
+    """Return which samples of a track are outliers, shape (n,).
 
     None is less than `least` [m] off the line between its neighbours, which are at most so many
     usual intervals away.
@@ -108,27 +108,27 @@ def _off_the_line(track: Track, longest_gap: float) -> Floats:
     return off
 
 
-def mistakes_warning(mistakes: int, samples: int) -> str:
-    """Return what to say of so many samples that were left out.
+def outliers_warning(outliers: int, samples: int) -> str:
+    """Return the warning about samples that were left out.
 
     Parameters
     ----------
-    mistakes, samples : int
+    outliers, samples : int
         Those that were left out, of how many.
 
     Examples
     --------
-    >>> mistakes_warning(3, 6000)[:38]
+    >>> outliers_warning(3, 6000)[:38]
     '3 of 6000 samples were left out: each '
     """
     return (
-        f"{mistakes} of {samples} samples were left out: each lies far from both of its "
-        "neighbours, as mistakes of a tracker do"
+        f"{outliers} of {samples} samples were left out: each lies far from both of its "
+        "neighbours, as tracking errors do"
     )
 
 
 def without_outliers(track: Track) -> Track:
-    """Return a track without the samples that are mistakes of the tracker: they become gaps.
+    """Return a track without its outliers: they become gaps.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def without_outliers(track: Track) -> Track:
 
 
 def without_far_outliers(track: Track) -> Track:
-    """Return a track without the mistakes that are longer than the body's usual steps.
+    """Return a track without the outliers that are longer than the body's usual steps.
 
     One that is found lets the next one show. Successive ones mask each other's pattern: they are
     far from the median of five samples.

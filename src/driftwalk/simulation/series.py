@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
-class SeriesPolicy(NamedTuple):
+class FlowContinuationPolicy(NamedTuple):
     """How a flow in frames continues after its last frame."""
 
     most_missing: float = 0.01
@@ -32,7 +32,7 @@ class SeriesPolicy(NamedTuple):
     noise; chosen by hand."""
 
 
-_SERIES: Final = SeriesPolicy()
+_CONTINUATION: Final = FlowContinuationPolicy()
 
 
 class Series(NamedTuple):
@@ -128,13 +128,13 @@ def continued_flow(
     repeat = stated if stated != "none" else str(flow.attrs.get("repeat", "none"))
     span, interval = float(time[-1] - time[0]), float(np.median(steps))
     if repeat == "none":
-        missing = min(interval, _SERIES.most_missing * span)
+        missing = min(interval, _CONTINUATION.most_missing * span)
         first = float(time[0]) if begin is None else begin
         if first < time[0] - missing or first + duration > time[-1] + missing:
             raise InputError(_ended(time, duration, begin))
     # A series that says itself how it goes on has a clock whose 0 is the begin of a run.
     own = 0.0 if "repeat" in flow.attrs else float(time[0])
-    closing = 0.0 if _join(flow) < _SERIES.closed else interval
+    closing = 0.0 if _join(flow) < _CONTINUATION.closed else interval
     return flow.assign_attrs(
         repeat=repeat,
         series_begin_s=float(flow.attrs.get("series_begin_s", own)) if begin is None else begin,

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays, Unit, UnitT
-from driftwalk.core.progress import Progress, tell_nobody
+from driftwalk.core.progress import Progress, ignore_progress
 from driftwalk.sweep.design import WorkUnit
 from driftwalk.sweep.workers import HANDOUT, Handout, UnitFunction, UnitFuture, handout, is_lost
 
@@ -222,7 +222,7 @@ class SweepSeries:
             units,
             store=None if self.store is None else self.store(name),
             executor=self.executor,
-            progress=lambda done, _: (self.progress or tell_nobody)(before + done, self.total),
+            progress=lambda done, _: (self.progress or ignore_progress)(before + done, self.total),
         )
 
 
@@ -266,7 +266,7 @@ class _Elsewhere:
 
     A worker holds a few units, and when it ends all of them are suspected. So those that were with
     too many such workers are handed out once more when all others are done, one at a time: one that
-    ends its workers then is to blame.
+    ends its workers then is at fault.
     """
 
     def __init__(
@@ -379,7 +379,7 @@ def _keep(
     except Exception as error:
         settings = ", ".join(f"{name} = {values[0]}" for name, values in unit.settings.items())
         raise SweepError(
-            f"unit {unit.id}, which begins with {settings}, {_what_befell(error)}; finished units "
+            f"unit {unit.id}, which begins with {settings}, {_failure_text(error)}; finished units "
             "are kept",
             unit_id=unit.id,
         ) from error
@@ -387,7 +387,7 @@ def _keep(
     tally.add(unit)
 
 
-def _what_befell(error: Exception) -> str:
+def _failure_text(error: Exception) -> str:
     """Return what a unit failed by."""
     if is_lost(error):
         deaths = int(getattr(error, "allowed_failures", 0)) + 1

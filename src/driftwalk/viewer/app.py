@@ -23,7 +23,7 @@ from driftwalk.viewer.security import HEADERS, Gate
 
 REQUEST_S: Final = 10.0
 """For how long a connection may take to send a whole request [s]. The head of one has some hundred
-bytes: a phone on a bad line needs a second or two. Whoever sends half of it and waits would
+bytes: a phone on a bad line needs a second or two. A client that sends half of it and waits would
 otherwise hold an open file of the server without end; chosen by hand."""
 
 Failed = Callable[[BaseException], None]
@@ -138,7 +138,7 @@ async def _listen(websocket: WebSocket, box: Outbox, source: Source) -> None:
                 box.drawn()
             else:
                 await source.receive(content, reply)
-            # Whoever sends without pause must not keep the others waiting.
+            # A client that sends without pause must not keep the others waiting.
             await asyncio.sleep(0)
     finally:
         await source.leave(reply)

@@ -33,8 +33,8 @@ def serve(
     source : Source
         Source of the page: a `RunSource`, a `LiveSource` or a `PlaySource`.
     host : str
-        Address to listen on. Away from loopback the page's address holds a random token, and
-        whoever has it sees the page.
+        Address to listen on. Away from loopback the page's address holds a random token, and anyone
+        who has it sees the page.
     port : int
         Port to listen on; 0 takes a free one.
     ready : callable, optional

@@ -55,7 +55,7 @@ def test_the_truth_is_found(run: tuple[Path, dict]) -> None:
 def test_the_right_model_is_believed_without_a_search(run: tuple[Path, dict]) -> None:
     found = open_netcdf(run[0] / "run" / "model_calibration.nc")
     assert "searched_estimate" not in found
-    assert float(found["misfit"]) <= float(found["most_misfit"])
+    assert float(found["discrepancy"]) <= float(found["discrepancy_q95"])
     assert float(found["interval_stretch"]) == 1.0
     assert found["verdict"] == "explains"
 

@@ -39,9 +39,9 @@ def test_summaries_name_the_true_model(tmp_path: Path, capsys: pytest.CaptureFix
     said = json.loads(done.out)
     by_name = {one["model"]: one for one in said["models"]}
     assert by_name["run_rest"]["named"]
-    assert by_name["run_rest"]["misfit"] <= by_name["run_rest"]["most_misfit"]
+    assert by_name["run_rest"]["discrepancy"] <= by_name["run_rest"]["discrepancy_q95"]
     assert not by_name["burst_coast"]["named"]
-    assert "misfit" not in by_name["resampled steps"]
+    assert "discrepancy" not in by_name["resampled steps"]
     assert said["findings"][0].startswith("run_rest explains the recording")
     assert said["findings"][1].startswith("run_rest is named by the summaries of the motion")
     print_result(open_netcdf(out / "comparison.nc"), out, json=False)

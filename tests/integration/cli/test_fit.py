@@ -29,7 +29,7 @@ def test_json_holds_what_is_promised(fitted: tuple[Path, Done]) -> None:
     assert set(REQUIRED) <= found.keys()
     assert found["force_interval_s"] == 0.016
     assert found["duration_s"] == pytest.approx(300.0)
-    assert found["mistakes"] == found["jumps_removed"] == found["dropped_frames"] == 0
+    assert found["outliers"] == found["jumps_removed"] == found["dropped_frames"] == 0
     for key in ("drag_coefficient", "force_std_N", "tracking_noise_m"):
         low, high = found[f"{key}_interval"]
         assert low < found[key] < high

@@ -19,7 +19,7 @@ from driftwalk.assembly import (
     outcome_distribution,
     sort_classes,
 )
-from driftwalk.assembly.outcomes.outcome_classes import CONTACT_POLICY, disc_class
+from driftwalk.assembly.outcomes.outcome_classes import BODY_CONTACT, disc_class
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.outcome_classes import class_cells, disc_places
 from driftwalk.schema.shapes import contacts_of
@@ -36,7 +36,7 @@ def study(**assembly: Any) -> dw.Study:
 
 @pytest.mark.parametrize(("gap", "name"), [(0.9, "triangle"), (1.1, "chain3")])
 def test_a_third_disc_within_the_gap_is_a_contact(gap: float, name: str) -> None:
-    side = DIAMETER * (1 + gap * CONTACT_POLICY.gap)
+    side = DIAMETER * (1 + gap * BODY_CONTACT.gap)
     height = np.sqrt(DIAMETER**2 - (side / 2) ** 2)
     places = np.array([(0.0, 0.0), (side, 0.0), (side / 2, height)])
     assert disc_class(places, [0, 0, 0], diameter=DIAMETER) == name

@@ -93,7 +93,7 @@ def test_a_given_flow_takes_the_place_of_all(
     assert modes[0].study.forces.force_std_N == FORCES_N[0]
     np.testing.assert_array_equal(modes[0].flow["u"], flow["u"])
     assert source.first_force in warnings
-    assert "that of flow low is taken for all" in str(source.first_force)
+    assert "the one of flow low is taken for all" in str(source.first_force)
     if changes:
         with pytest.raises(InputError, match="changes in time"):
             make_modes(modes, flow_scales=[0.0, 1.0])

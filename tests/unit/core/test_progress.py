@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from driftwalk.core.progress import WHOLE, Course, share_of_search
+from driftwalk.core.progress import WHOLE, StagedProgress, share_of_search
 
 
 def test_stages_that_begin_again_do_not_take_the_whole_back() -> None:
     told: list[tuple[int, int, str]] = []
-    course = Course(lambda *said: told.append(said), {"search": 6.0, "check": 3.0, "figures": 1.0})
-    search = course.stage("search")
+    staged = StagedProgress(
+        lambda *said: told.append(said), {"search": 6.0, "check": 3.0, "figures": 1.0}
+    )
+    search = staged.stage("search")
     for done in (0, 3, 6, 1, 2, 6):
         search(done, 6, "again" if done == 1 else "")
-    course.begin("check")
-    course.begin("figures")
+    staged.begin("check")
+    staged.begin("figures")
     assert [one[0] for one in told] == [0, 300, 600, 600, 600, 600, 600, 900]
     assert {one[1] for one in told} == {WHOLE}
     assert [told[k][2] for k in (0, 3, 6, 7)] == ["search", "again", "check", "figures"]
@@ -22,8 +24,8 @@ def test_stages_that_begin_again_do_not_take_the_whole_back() -> None:
 
 def test_a_stage_inside_a_stage_fills_its_part_alone() -> None:
     told: list[int] = []
-    outer = Course(lambda done, *_: told.append(done), {"fit": 1.0, "check": 1.0})
-    inner = Course(outer.stage("fit"), {"likelihood": 3.0, "drag": 1.0})
+    outer = StagedProgress(lambda done, *_: told.append(done), {"fit": 1.0, "check": 1.0})
+    inner = StagedProgress(outer.stage("fit"), {"likelihood": 3.0, "drag": 1.0})
     inner.begin("likelihood")
     inner.begin("drag")
     inner.stage("drag")(1, 1)
@@ -32,7 +34,7 @@ def test_a_stage_inside_a_stage_fills_its_part_alone() -> None:
 
 def test_a_stage_of_no_known_work_is_done() -> None:
     told: list[int] = []
-    Course(lambda done, *_: told.append(done), {"runs": 1.0}).stage("runs")(0, 0)
+    StagedProgress(lambda done, *_: told.append(done), {"runs": 1.0}).stage("runs")(0, 0)
     assert told == [WHOLE]
 
 

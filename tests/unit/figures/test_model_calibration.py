@@ -26,8 +26,8 @@ def test_every_pair_has_a_panel_and_its_draws(found: xr.Dataset) -> None:
     assert len(shown) == 6
     below = figure.axes[3]
     draws, estimate = below.lines
-    assert draws.get_xdata().tolist() == found["draws"][:, 0].values.tolist()
-    assert draws.get_ydata().tolist() == found["draws"][:, 1].values.tolist()
+    assert draws.get_xdata().tolist() == found["posterior_sample"][:, 0].values.tolist()
+    assert draws.get_ydata().tolist() == found["posterior_sample"][:, 1].values.tolist()
     assert estimate.get_xdata() == [float(found["estimate"][0])]
 
 
@@ -87,7 +87,7 @@ def test_the_quality_shows_the_distances(found: xr.Dataset) -> None:
 
 @pytest.mark.slow
 def test_without_draws_there_are_no_pairs(found: xr.Dataset, tmp_path: Path) -> None:
-    rest = found.drop_vars(["draws", "profile_value", "profile_misfit"])
+    rest = found.drop_vars(["posterior_sample", "profile_value", "profile_discrepancy"])
     written = write_figures(model_calibration_figures(rest), tmp_path, ("png",))
     assert [path.name for path in written] == ["quality.png"]
     with pytest.raises(InputError, match="expected a dataset 'model_calibration'"):

@@ -426,7 +426,7 @@ def test_renamed_and_missing_variables_of_pivlab(tmp_path: Path) -> None:
         ({"length_unit": "ft"}, "`length_unit` is one of m, cm, mm, um, px"),
         ({"length_unit": "mm", "metres_per_pixel": 1e-3}, "says what `metres_per_pixel` would"),
         ({**PIXELS, "y_axis": "left"}, "`y_axis` is 'up' or 'down'"),
-        ({**PIXELS, "variables": {"u": "a"}}, "those of a NetCDF file"),
+        ({**PIXELS, "variables": {"u": "a"}}, "variables of a NetCDF file"),
     ],
 )
 def test_facts_that_are_missing_or_too_many(

@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.check.criteria import VERDICT
+from driftwalk.likelihood.check.criteria import MODEL_CHECK
 from driftwalk.likelihood.check.measured import best_placement
 from driftwalk.likelihood.measured_flow import (
     MEASURED,
@@ -268,7 +268,7 @@ def test_a_stored_fit_has_the_same_prior() -> None:
 
 
 def test_one_level_is_that_of_the_check() -> None:
-    assert MEASURED.level == VERDICT.level
+    assert MEASURED.level == MODEL_CHECK.level
 
 
 def test_what_is_no_measurement_of_a_steady_flow_is_refused() -> None:

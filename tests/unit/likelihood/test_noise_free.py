@@ -91,7 +91,7 @@ def test_a_square_whose_orientation_is_not_used_gets_none(
 
 @pytest.mark.slow
 def test_a_recording_without_noise_is_explained() -> None:
-    """Of the other engine. As it is: σ_F 4 % low, beyond its interval, and condemned."""
+    """Of the other engine. As it is: σ_F 4 % low, beyond its interval, and rejected."""
     recording = dw.tank30_recording("without_noise")
     study = dw.apply_overrides(dw.Study(), {"forces.force_interval_s": 0.016})
     fit = dw.fit_motion(recording, study)
@@ -105,4 +105,4 @@ def test_a_recording_without_noise_is_explained() -> None:
     facts = facts_of(fit)
     assert facts["added_position_noise_m"] == pytest.approx(9e-5, rel=0.01)
     assert facts["tracking_noise_m"] == pytest.approx(9e-5, rel=0.03)
-    assert any("hardly any noise of a camera" in str(one) for one in fit["warning"].values)
+    assert any("almost no camera noise" in str(one) for one in fit["warning"].values)

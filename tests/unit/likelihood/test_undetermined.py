@@ -170,7 +170,7 @@ def test_a_check_or_a_wall_that_breaks_down_leaves_the_fit(error: Any, monkeypat
     found = judge_fit(fit, [track])
     assert found.check is None
     assert str(error) in found.fit.attrs["check_left_out"]
-    monkeypatch.setattr(wall, "CONTACT", wall.CONTACT._replace(fewest=0))
+    monkeypatch.setattr(wall, "WALL_CONTACT", wall.WALL_CONTACT._replace(fewest=0))
     monkeypatch.setattr(wall, "search_walls", breaks)
     assert str(error) in estimate_wall(fit, [track]).attrs["wall_left_out"]
 
@@ -251,10 +251,10 @@ def test_every_search_beside_the_law_may_break_down_alone(error: Any) -> None:
     search = object.__new__(LawSearch)
     law = LawResult(None, None, False, {}, math.inf, None)  # type: ignore[arg-type]
     for what in ("departures from it", "the other law"):
-        law = search._beside(law, what, breaks)
+        law = search._try_search(law, what, breaks)
     assert law.left_out == ("departures from it", "the other law")
     other = replace(law, floating=True, left_out=())
-    found = search._beside(law, "another power of the drag", lambda: other)
+    found = search._try_search(law, "another power of the drag", lambda: other)
     assert (found.floating, found.left_out) == (True, law.left_out)
 
 

@@ -68,10 +68,10 @@ def test_summaries_have_a_table_of_the_models_that_were_asked(comparison: xr.Dat
     matched = comparison.assign(
         asked=("model", asked),
         named=("model", first),
-        misfit=of_asked(101.0, 812.0),
-        usual_misfit=of_asked(99.0, 98.0),
-        most_misfit=of_asked(140.0, 141.0),
-        unlikely=of_asked(-400.0, 300.0),
+        discrepancy=of_asked(101.0, 812.0),
+        discrepancy_median=of_asked(99.0, 98.0),
+        discrepancy_q95=of_asked(140.0, 141.0),
+        deviance=of_asked(-400.0, 300.0),
     )
     (table,) = (part for part in model_sections(matched) if part["id"] == "summaries")
     names = comparison["model"].values[asked]

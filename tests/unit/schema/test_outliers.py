@@ -1,4 +1,4 @@
-"""Mistakes of the tracker are found by their pattern; turns, bounces and jumps are none."""
+"""Outliers of a track are found by their pattern; turns, bounces and jumps are none."""
 
 from __future__ import annotations
 
@@ -166,11 +166,11 @@ def test_one_sample_in_twenty_may_be_wrong(size_m: float) -> None:
     names = ("drag_coefficient", "force_std_N", "tracking_noise_m")
     moved = [np.log(facts_of(found)[name] / facts_of(clean)[name]) for name in names]
     assert np.abs(np.array(moved) / std).max() < 1.0
-    left_out = facts_of(found)["mistakes"]
+    left_out = facts_of(found)["outliers"]
     assert 0.03 * 3001 < left_out < 0.06 * 3001
     assert facts_of(found)["samples"] == 3001
     assert any(f"{left_out} of 3001 samples" in text for text in facts_of(found)["warnings"])
-    assert facts_of(clean)["mistakes"] == 0
+    assert facts_of(clean)["outliers"] == 0
 
 
 @pytest.mark.slow
@@ -183,7 +183,7 @@ def test_samples_beyond_the_greatest_speed_are_counted(tmp_path: Path) -> None:
     ready = prepare([read], coarse_study(), None, None)
     wrong = int((film["x"].values != recording(SECONDS)["x"].values).sum())
     assert ready.facts["jumps_removed"] == wrong
-    assert ready.mistakes == 0
+    assert ready.outliers == 0
     assert ready.samples == 3001 - wrong
     damaged = read.assign_attrs(counts='{"per_body": [1]}')
     assert prepare([damaged], coarse_study(), None, None).facts["jumps_removed"] == 0

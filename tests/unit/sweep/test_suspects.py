@@ -1,4 +1,4 @@
-"""Units whose workers end: who is to blame, on synthetic workers that hold three units each.
+"""Units whose workers end: which one is at fault, on synthetic workers that hold three units each.
 
 The real ones are in tests/integration/cli/test_cluster.py.
 """

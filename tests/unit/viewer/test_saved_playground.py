@@ -23,7 +23,7 @@ from browser_tank import (
 import driftwalk as dw
 from driftwalk.assembly import assemble
 from driftwalk.assembly.lattice.polyomino import polyominoes
-from driftwalk.assembly.outcomes.outcome_classes import CONTACT_POLICY, disc_class, world_class
+from driftwalk.assembly.outcomes.outcome_classes import BODY_CONTACT, disc_class, world_class
 from driftwalk.comparison import apply_steps, ks_distance, ks_reference, plan_steps
 from driftwalk.datasets import tank30_flow, tank30_recording
 from driftwalk.schema.shapes import cells_of_shape
@@ -165,7 +165,7 @@ def test_contact_graphs_have_the_names_that_python_gives(noun: str, width: float
     given = {"noun": noun, "side": side, "width": width}
     found = in_node(
         named,
-        {"worlds": [one[:2] for one in worlds], "bodies": given, "gap": CONTACT_POLICY.gap},
+        {"worlds": [one[:2] for one in worlds], "bodies": given, "gap": BODY_CONTACT.gap},
     )
     assert found == [one[2] for one in worlds]
     assert len(set(found)) > 100

@@ -228,7 +228,7 @@ def _expected(
 
 
 def _with_prior(events: Floats, times: Floats, rate: Floats) -> Floats:
-    """Return rates, with a prior of so many events at a given rate; a rate of zero stays zero."""
+    """Return rates, with a prior of some events at a given rate; a rate of zero stays zero."""
     lasted = np.divide(EM_POLICY.weight, rate, out=np.zeros_like(rate), where=rate > 0)
     above, below = events + EM_POLICY.weight, times + lasted
     return np.divide(above, below, out=np.zeros_like(events), where=rate > 0)

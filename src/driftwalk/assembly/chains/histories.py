@@ -116,8 +116,8 @@ def histories(datasets: Sequence[xr.Dataset], *, classes: Sequence[str] | None =
     sizes = {blocks_of(name) for name in names}
     if len(sizes) > 1:
         raise InputError(
-            f"runs of {' and '.join(map(str, sorted(sizes)))} blocks cannot be taken together: "
-            "give those of one number of blocks"
+            f"runs of {' and '.join(map(str, sorted(sizes)))} blocks cannot be combined: give only "
+            "runs with one number of blocks"
         )
     if len(names) > MOST_CLASSES:
         raise InputError(

@@ -208,11 +208,13 @@ def judge_mixing(found: Histories) -> Mixing:
     elif most < needed:
         runs = math.ceil(found.runs * needed / max(most, 1))
         word = CANNOT_TELL
-        reasons = [f"{found.runs} runs cannot tell a tank that is not well mixed: record {runs}"]
+        reasons = [
+            f"{found.runs} runs are too few to detect that a tank is not well mixed: record {runs}"
+        ]
     else:
         least = min((one.p for one in tests), default=1.0)
         word = WELL_MIXED
-        reasons = [f"none of {len(tests)} tests refuses it; the smallest p is {least:.2g}"]
+        reasons = [f"none of {len(tests)} tests rejects it; the smallest p is {least:.2g}"]
     return Mixing(word, reasons, tests, corrected)
 
 

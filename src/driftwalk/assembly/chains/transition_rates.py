@@ -63,7 +63,7 @@ class KineticsPolicy(NamedTuple):
     stored: int = 120
     """Steps of the stored curves; chosen by hand."""
     confidence: float = 0.9
-    """Of the intervals and bands; by convention that of the rest of driftwalk."""
+    """Of the intervals and bands; by convention the same in all of driftwalk."""
 
 
 KINETICS_POLICY = KineticsPolicy()
@@ -100,7 +100,7 @@ def kinetics(
     seed : int
         Seed of the bootstrap, at least 0.
     store : callable, optional
-        Returns the store of a sweep by its name, such as that of a run directory, to be continued.
+        Returns the store of a sweep by its name, for example of a run directory, to be continued.
     executor : concurrent.futures.Executor, optional
         Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional
@@ -234,8 +234,8 @@ def check_kinetics(
     sizes = [blocks_of(one[0]) for one in names]
     if len({*sizes}) > 1:
         raise InputError(
-            f"the data sets have {sizes[0]} and {sizes[1]} blocks: give those of one number of "
-            "blocks"
+            f"the data sets have {sizes[0]} and {sizes[1]} blocks: give only data sets with one "
+            "number of blocks"
         )
     known = sort_classes([name for one in names for name in one])
     sets = [histories(one, classes=known) for one in given]

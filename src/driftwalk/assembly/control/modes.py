@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 DRAWS = 100
 """Draws from the uncertainty of a fit, one turn of worlds after the other; chosen by hand."""
 MOST_MODES = 100
-"""Modes, at most: each needs runs of its own. Chosen by hand."""
+"""Modes, at most: each needs separate runs. Chosen by hand."""
 
 
 class ModeSource(NamedTuple):

@@ -1,11 +1,11 @@
 """Plan the control of self-assembly: a policy from runs in all modes, then from its own runs.
 
-Whole runs of the microscopic engine then improve the policy without a model. Each world has a mode
-of its own in every cell: a phase of the run, a class, and an age. Whether it reached the target
-counts for all cells that it visited, each with the mode it had there (Monte Carlo control; Sutton
-and Barto, Reinforcement learning, chapter 5). The probability that a mode of a cell reaches the
-target has a Beta law. Modes are drawn in proportion to their probability of being the best
-(Thompson 1933), so that most worlds soon try what may be better.
+Whole runs of the microscopic engine then improve the policy without a model. Each world has its own
+mode in every cell: a phase of the run, a class, and an age. Whether it reached the target counts
+for all cells that it visited, each with the mode it had there (Monte Carlo control; Sutton and
+Barto, Reinforcement learning, chapter 5). The probability that a mode of a cell reaches the target
+has a Beta law. Modes are drawn in proportion to their probability of being the best (Thompson
+1933), so that most worlds soon try what may be better.
 
 A stored policy gives its modes and rules, ready to run.
 """
@@ -145,7 +145,7 @@ class ControlPolicy(NamedTuple):
     unit: int = 250
     """Worlds of a work unit, about a second; chosen by hand."""
     confidence: float = 0.9
-    """Of the intervals; by convention that of the rest of driftwalk."""
+    """Of the intervals; by convention the same in all of driftwalk."""
 
 
 CONTROL_POLICY = ControlPolicy()
@@ -198,18 +198,20 @@ def check_control(modes: Modes, wanted: Wanted) -> Wanted:
         )
     if not wanted.every_s <= wanted.by_s:
         raise InputError(
-            f"decisions every {wanted.every_s:g} s need a deadline that is not sooner, got "
-            f"{wanted.by_s:g} s"
+            f"the deadline must not be shorter than the decision period of {wanted.every_s:g} s, "
+            f"got {wanted.by_s:g} s"
         )
     whole = wanted.by_s / wanted.every_s
     if abs(whole - round(whole)) > 1e-6 * whole:
         raise InputError(
-            f"the deadline of {wanted.by_s:g} s is no whole number of periods of "
+            f"the deadline of {wanted.by_s:g} s is not a whole number of periods of "
             f"{wanted.every_s:g} s: choose another deadline or period"
         )
     wanted.require_in_range()
     if not 0.0 <= wanted.dwell_s <= wanted.by_s:
-        raise InputError(f"the dwell is from 0 s to the deadline, got {wanted.dwell_s:g} s")
+        raise InputError(
+            f"the dwell must lie between 0 s and the deadline, got {wanted.dwell_s:g} s"
+        )
     return replace(wanted, target=target)
 
 
@@ -249,9 +251,9 @@ def plan_control(
     latency : float
         From a look at the tank until the pumps have changed [s], below `every`.
     missed : float
-        Share of the looks that give no class, 0 to below 1; the mode is held then.
+        Share of the observations that give no class, 0 to below 1; the mode is held then.
     dwell : float
-        Time for which a mode is held at least [s].
+        Shortest time for which a mode is held [s].
     rounds : int
         Rounds of planning, from 1.
     worlds : int
@@ -259,7 +261,7 @@ def plan_control(
     seed : int
         Seed of all worlds.
     store : callable, optional
-        Returns the store of a sweep by its name, such as that of a run directory, to be continued.
+        Returns the store of a sweep by its name, for example of a run directory, to be continued.
     executor : concurrent.futures.Executor, optional
         Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional

@@ -122,9 +122,9 @@ class Wanted:
     latency_s : float
         From a look at the tank until the pumps have changed [s], below a period.
     missed : float
-        Share of the looks that give no class.
+        Share of the observations that give no class.
     dwell_s : float
-        Time for which a mode is held at least [s].
+        Shortest time for which a mode is held [s].
     """
 
     target: str

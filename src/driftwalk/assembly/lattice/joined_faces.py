@@ -172,7 +172,7 @@ class PairPoses(NamedTuple):
 
     time: Floats
     apart: Floats
-    """From the centre of the first to that of the second, (2, n)."""
+    """From the centre of the first to the centre of the second, (2, n)."""
     theta: Floats
     """Orientations, (2, n)."""
 

@@ -66,7 +66,7 @@ class SquareWorld:
         self.bonded: list[set[int]] = [set() for _ in range(blocks)]
 
     def join(self, block: list[int], face: list[int]) -> tuple[int, int]:
-        """Put the second block's body to that of the first; return the two bodies."""
+        """Join the second block's body to the first one's; return the two bodies."""
         stays, moves = self.body[block[0]], self.body[block[1]]
         if stays == moves:
             raise InputError("joins two blocks of one assembly")

@@ -155,7 +155,7 @@ def polyominoes(size: int, *, chirality: Chirality = "merged") -> tuple[str, ...
 
 @lru_cache(maxsize=1 << 16)
 def shape_order(name: str) -> tuple[int, int, str, str]:
-    """Return what shapes are sorted by: their size, then their place among those of that size."""
+    """Return what shapes are sorted by: their size, then their place among shapes of that size."""
     if name in NAMED_SHAPES:
         return shape_size(name), list(NAMED_SHAPES).index(name), "", ""
     if discs_of(name):

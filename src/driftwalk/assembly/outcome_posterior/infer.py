@@ -32,7 +32,7 @@ from driftwalk.assembly.outcome_posterior.records import (
     Record,
 )
 from driftwalk.assembly.outcome_posterior.region import (
-    REGION_POLICY,
+    CREDIBLE_REGION,
     Coverage,
     intervals_of,
     self_check,
@@ -40,7 +40,7 @@ from driftwalk.assembly.outcome_posterior.region import (
 )
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS
 from driftwalk.core.arrays import Floats
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.core.study_keys import INFERRED_KEYS
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.facts import texts
@@ -107,7 +107,7 @@ def infer_outcomes(
     seed : int
         Seed of the simulations, at least 0.
     store : callable, optional
-        Returns the store of a sweep by its name, such as that of a run directory, to be continued.
+        Returns the store of a sweep by its name, for example of a run directory, to be continued.
     progress : callable, optional
         Called as ``progress(done, total)`` with simulated runs; the total is the largest possible.
     threads : int, optional
@@ -160,7 +160,7 @@ class _Course:
     def __init__(
         self, problem: OutcomeProblem, store: Any, progress: Progress | None, executor: Any
     ) -> None:
-        self.store, self.executor, self.progress = store, executor, progress or tell_nobody
+        self.store, self.executor, self.progress = store, executor, progress or ignore_progress
         nodes = DESIGN_POLICY.first_nodes + DESIGN_POLICY.rounds * DESIGN_POLICY.more_nodes
         self.checks = problem.truths * len(problem.observed.records)
         self.total = nodes * len(problem.names) * problem.study.sensitivity.runs + self.checks
@@ -285,20 +285,20 @@ PREFERRED = (BOTH, CLASSES, JOINS, TIMES, EARLY)
 def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Checked) -> xr.Dataset:
     """Return the dataset of a posterior."""
     low, span = problem.low, problem.high - problem.low
-    coverage, policy = checked.coverage, REGION_POLICY
+    coverage, policy = checked.coverage, CREDIBLE_REGION
     explained = checked.explained
     offered = [
         kind for kind in PREFERRED if explained and kind in problem.kinds and coverage[kind].offered
     ]
     used = offered[0] if offered else None
-    ends = np.full((len(KINDS), len(problem.names), 3), np.nan)
+    bounds = np.full((len(KINDS), len(problem.names), 3), np.nan)
     weight = np.full(len(emulated.point), 1.0 / len(emulated.point))
     for at, kind in enumerate(KINDS):
         if kind in offered:
             own = weights_of(checked.log_likelihood[kind], power=coverage[kind].power)
-            ends[at] = intervals_of(emulated.point, own)
+            bounds[at] = intervals_of(emulated.point, own)
             weight = own if kind == used else weight
-    chosen = ends[KINDS.index(used)] if used else ends[0]
+    chosen = bounds[KINDS.index(used)] if used else bounds[0]
     limit = limits_of(chosen)
     value = low + emulated.point * span
     if not explained:
@@ -309,14 +309,14 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
     most = int(np.argmax(np.abs(seen - predicted)))
     worst = names[most] if names[most] == "rest" else short_class(names[most])
     first, _, last = intervals_of(emulated.point, weight).T
-    unlike = (
+    poor_fit = (
         "widen the ranges, or the model is wrong"
         if not explained and ((first < policy.edge) | (last > 1.0 - policy.edge)).any()
         else f"most in {worst}, {seen[most]:.3f} seen and {predicted[most]:.3f} predicted"
     )
     unit = [_unit(name) for name in problem.names]
     noise = emulated.noise[used or CLASSES]
-    reasons = _reasons(problem, chosen, limit, checked, used, unlike)
+    reasons = _reasons(problem, chosen, limit, checked, used, poor_fit)
     if used and noise >= DESIGN_POLICY.noise:
         reasons.append(
             f"the emulator's error is {in_percent(noise)} of the sampling error, and not below "
@@ -349,7 +349,7 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
         "expected_width": (
             ("data", "parameter"), np.stack([coverage[kind].width for kind in kinds])
         ),
-        "width": (("data", "parameter"), (ends[..., 2] - ends[..., 0]) / policy.confidence),
+        "width": (("data", "parameter"), (bounds[..., 2] - bounds[..., 0]) / policy.confidence),
         "count": ("class", observed),
         "share": ("class", predicted),
         "node_value": (("node", "parameter"), low + emulated.node * span),
@@ -398,8 +398,8 @@ def _unit(name: str) -> str:
     return "1" if quantity is None else quantity.unit
 
 
-def limits_of(ends: Floats) -> npt.NDArray[Any]:
-    """Return which ends of the intervals are limits: both, one, or none if wide or not stated.
+def limits_of(bounds: Floats) -> npt.NDArray[Any]:
+    """Return which bounds of the intervals are limits: both, one, or none if wide or not stated.
 
     An end that is that of the range is none of the data's.
 
@@ -408,8 +408,8 @@ def limits_of(ends: Floats) -> npt.NDArray[Any]:
     >>> limits_of(np.array([[0.3, 0.4, 0.5], [0.0, 0.2, 0.4], [0.0, 0.5, 0.9]])).tolist()
     ['both', 'upper', 'none']
     """
-    policy = REGION_POLICY
-    low, high = ends[:, 0], ends[:, 2]
+    policy = CREDIBLE_REGION
+    low, high = bounds[:, 0], bounds[:, 2]
     narrow = (high - low) / policy.confidence < policy.prior_like
     sides = [~narrow, low < policy.edge, high > 1.0 - policy.edge]
     return np.select(sides, [NO_END, UPPER_END, LOWER_END], BOTH_ENDS)
@@ -417,28 +417,28 @@ def limits_of(ends: Floats) -> npt.NDArray[Any]:
 
 def _reasons(
     problem: OutcomeProblem,
-    ends: Floats,
+    bounds: Floats,
     limit: Any,
     checked: Checked,
     used: str | None,
-    unlike: str,
+    poor_fit: str,
 ) -> list[str]:
-    """Return sentences for what is not determined, and why; `unlike`: where the model fails."""
-    policy, found = REGION_POLICY, []
+    """Return sentences for what is not determined, and why; `poor_fit`: where the model fails."""
+    policy, found = CREDIBLE_REGION, []
     if not checked.explained:
         found.append(
-            f"the outcomes agree with no setting of the ranges (p = {checked.p:.2g}): {unlike}"
+            f"the outcomes agree with no setting of the ranges (p = {checked.p:.2g}): {poor_fit}"
         )
         return found
     if used is None:
         lacking = ", ".join(
-            f"those of {kind} hold {in_percent(min(one.joint, *one.marginal))}"
+            f"for {kind} they hold {in_percent(min(one.joint, *one.marginal))}"
             for kind, one in checked.coverage.items()
             if kind in problem.kinds
         )
         found.append(f"regions do not cover in the self-check ({lacking}): use narrower ranges")
         return found
-    for name, side, (low, _, high) in zip(problem.names, limit, ends, strict=True):
+    for name, side, (low, _, high) in zip(problem.names, limit, bounds, strict=True):
         words = axis_number(name).plain
         if side == NO_END:
             found.append(

@@ -27,7 +27,7 @@ from driftwalk.assembly.outcome_posterior.records import (
     records_of_events,
     records_to_text,
 )
-from driftwalk.assembly.outcome_posterior.region import REGION_POLICY, Coverage
+from driftwalk.assembly.outcome_posterior.region import CREDIBLE_REGION, Coverage
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import chirality_of
 from driftwalk.assembly.sensitivity.settings import (
@@ -337,4 +337,4 @@ class Checked(NamedTuple):
     @property
     def explained(self) -> bool:
         """Whether some setting agrees with the outcomes, as far as so many data sets can tell."""
-        return self.p >= max(REGION_POLICY.unlike, 1.5 / (len(self.truth) + 1))
+        return self.p >= max(CREDIBLE_REGION.least_p, 1.5 / (len(self.truth) + 1))

@@ -9,11 +9,11 @@ import numpy as np
 from driftwalk.core.arrays import Bools, Floats
 
 
-class RegionPolicy(NamedTuple):
+class CredibleRegionPolicy(NamedTuple):
     """How regions are stated, and when they are not."""
 
     confidence: float = 0.9
-    """Of intervals and regions; by convention that of the rest of driftwalk."""
+    """Of intervals and regions; by convention the same in all of driftwalk."""
     slack: float = 2.35
     """Standard errors by which the coverage in the self-check may be smaller: to 85 % with 200
     truths. Of exact regions, 1 % are smaller by chance."""
@@ -26,12 +26,12 @@ class RegionPolicy(NamedTuple):
     hand."""
     edge: float = 0.01
     """Share of a range within which an end of an interval is that of the range; chosen by hand."""
-    unlike: float = 0.01
+    least_p: float = 0.01
     """p-value of the outcomes below which no region is stated: one false alarm in a hundred. With
     few data sets in the self-check, less than all of them."""
 
 
-REGION_POLICY = RegionPolicy()
+CREDIBLE_REGION = CredibleRegionPolicy()
 
 
 def weights_of(log_likelihood: Floats, *, power: float = 1.0) -> Floats:
@@ -65,7 +65,7 @@ def intervals_of(point: Floats, weight: Floats) -> Floats:
 
     Where a posterior lies at an end of its range, the interval begins there.
     """
-    policy = REGION_POLICY
+    policy = CREDIBLE_REGION
     low = np.linspace(0.0, 1.0 - policy.confidence, policy.tried)
     found = quantiles_of(point, weight, np.r_[low, low + policy.confidence, 0.5])
     first, last = found[..., : low.size], found[..., low.size : -1]
@@ -118,7 +118,7 @@ def covered(
     weight = weights_of(log_likelihood, power=power)
     denser = np.where(log_likelihood > own[:, None], weight, 0.0).sum(axis=1)
     low, _, high = np.moveaxis(intervals_of(point, weight), -1, 0)
-    return denser <= REGION_POLICY.confidence, (low <= truth) & (truth <= high), high - low
+    return denser <= CREDIBLE_REGION.confidence, (low <= truth) & (truth <= high), high - low
 
 
 def log_score(log_likelihood: Floats, own: Floats, *, power: float) -> float:
@@ -137,7 +137,7 @@ def self_check(point: Floats, truth: Floats, log_likelihood: Floats, own: Floats
 
     A power below one widens the posterior. Parameters as of `covered`.
     """
-    policy, tried = REGION_POLICY, None
+    policy, tried = CREDIBLE_REGION, None
     nominal = policy.confidence
     least = nominal - policy.slack * np.sqrt(nominal * (1.0 - nominal) / len(truth))
     scores = [log_score(log_likelihood, own, power=power) for power in policy.powers]

@@ -142,7 +142,7 @@ def rate_variables(
     count, time, confidence
         As in `rate_interval`, one entry per class.
     clusters : array_like
-        By how much events cluster: the interval is that of so many times fewer in less time.
+        By how much events cluster: the interval is for this factor fewer events in less time.
     """
     number, span = np.asarray(count), np.asarray(time, dtype=np.float64)
     fewer = 1.0 / np.asarray(clusters, dtype=np.float64)

@@ -67,8 +67,8 @@ def principal_components(
         ``explained_variance_ratio`` (component), ``mean`` (class), ``complete_correlation``
         (component), see `Alignment`; components are counted from 1.
         Loadings have length 1 and the largest of a component in size is positive; a class that is
-        the same in all settings, one that never occurs for example, has loading 0. ``attrs``: those
-        of the dataset, ``settings``, ``left_out``, ``total_variance`` (sum over the classes of the
+        the same in all settings, one that never occurs for example, has loading 0. ``attrs``: the
+        dataset's, ``settings``, ``left_out``, ``total_variance`` (sum over the classes of the
         variance over settings) and ``noise_share``: the part of it that comes from the finite
         number of runs, NaN where their number is not known.
 

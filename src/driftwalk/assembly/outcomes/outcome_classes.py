@@ -418,7 +418,7 @@ def _order(shape: str) -> tuple[int, tuple[int, int, str, str], str]:
     return -shape_size(name), shape_order(name), kinds
 
 
-class ContactPolicy(NamedTuple):
+class BodyContactPolicy(NamedTuple):
     """When discs, or rectangles, of one assembly touch."""
 
     gap: float = 0.01
@@ -427,7 +427,7 @@ class ContactPolicy(NamedTuple):
     one leaves."""
 
 
-CONTACT_POLICY: Final = ContactPolicy()
+BODY_CONTACT: Final = BodyContactPolicy()
 
 
 def overlap_depth(
@@ -473,10 +473,10 @@ def touching(places: Floats, *, diameter: float, width: float | None = None) -> 
     if width is None:
         x, y = places[:, 0], places[:, 1]
         apart = np.hypot(x[:, None] - x, y[:, None] - y)
-        return np.asarray(apart <= diameter * (1.0 + CONTACT_POLICY.gap))
+        return np.asarray(apart <= diameter * (1.0 + BODY_CONTACT.gap))
     first, second = (index.ravel() for index in np.indices((len(places), len(places))))
     depth = overlap_depth(places[first], places[second], side=diameter, width=width)
-    gap = CONTACT_POLICY.gap * max(diameter, width)
+    gap = BODY_CONTACT.gap * max(diameter, width)
     return np.asarray(depth >= -gap).reshape(len(places), -1)
 
 
@@ -486,7 +486,7 @@ def contact_pairs(
     """Return the pairs that touch, of many bodies; parameters as in `touching`."""
     from scipy.spatial import cKDTree
 
-    gap = CONTACT_POLICY.gap
+    gap = BODY_CONTACT.gap
     if width is None:
         return sorted(cKDTree(places[:, :2]).query_pairs(diameter * (1.0 + gap)))
     reach = math.hypot(diameter, width) + math.sqrt(2.0) * gap * max(diameter, width)

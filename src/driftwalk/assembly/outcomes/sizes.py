@@ -58,7 +58,7 @@ def assembly_sizes(
         beyond that come groups that double, from ``size`` to ``size_to`` blocks. Over ``time``:
         ``mean_size`` (blocks over assemblies), ``largest_share`` (share of the blocks that are in
         the largest assembly), ``free_share`` (that of the blocks that are alone) and
-        ``compactness``. ``attrs``: those of the assembly, ``runs``, ``left_out``, ``confidence``,
+        ``compactness``. ``attrs``: the assembly's, ``runs``, ``left_out``, ``confidence``,
         ``method``, ``compactness`` at the end, and ``compactness_runs``, the runs that have one.
         All are means over runs, with ``_low`` and ``_high``.
 

@@ -108,7 +108,7 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
     joined = np.concatenate([shares[:, : batches // 2], shares[:, batches // 2 :]])
     parts = shares.mean(axis=1) if batches == 2 else shares.reshape(-1, len(names))
     half = joined.shape[0] // 2
-    p = _steadiness((joined[half:] - joined[:half]).reshape(-1, len(names)))
+    p = _stationarity_p_value((joined[half:] - joined[:half]).reshape(-1, len(names)))
     time = np.bincount(stays.state, weights=stays.lasts, minlength=len(names)).astype(np.float64)
     data: dict[str, Any] = {
         **with_limits("time_share", "class", *_mean_and_ends(parts, confidence)),
@@ -194,7 +194,7 @@ def _mean_and_ends(parts: Floats, confidence: float) -> tuple[Floats, Floats, Fl
     return mean, low, np.where(never, seldom, high)
 
 
-def _steadiness(differences: Floats) -> float:
+def _stationarity_p_value(differences: Floats) -> float:
     """Return how often chance alone makes the classes' shares differ as much, or more."""
     generator = np.random.default_rng(1)
     varies = (differences != 0.0).any(axis=0)

@@ -70,7 +70,7 @@ def class_times(
         Kind "class_times". ``proportion`` (time, class) with ``proportion_low``,
         ``proportion_high`` (Clopper-Pearson); ``first_contact`` and ``completion`` (time), the
         share of runs in which it has NOT happened yet, with ``_low`` and ``_high``, see
-        `survival_curve`. ``attrs``: those of the assembly, ``runs``, ``left_out``, ``confidence``,
+        `survival_curve`. ``attrs``: the assembly's, ``runs``, ``left_out``, ``confidence``,
         and ``first_contact_median_s``, ``completion_median_s``, each with ``_low_s`` and
         ``_high_s`` (NaN when not reached).
 

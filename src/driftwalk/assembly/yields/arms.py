@@ -23,7 +23,7 @@ from driftwalk.assembly.sensitivity.settings import (
     simulate_pieces,
 )
 from driftwalk.assembly.sensitivity.times import kept_times
-from driftwalk.assembly.yields.selection import SEARCH, Tally, starting_points
+from driftwalk.assembly.yields.selection import COMPASS, Tally, starting_points
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.files.shards import Arrays
 from driftwalk.schema.shapes import all_single
@@ -76,7 +76,7 @@ class Arms:
         """Return the arm with listed values, and at a place of the unit cube of the ranges."""
         point = dict(listed)
         for share, (name, (low, high)) in zip(place, self.ranges.items(), strict=True):
-            rounded = float(f"{low + share * (high - low):.{SEARCH.digits}g}")
+            rounded = float(f"{low + share * (high - low):.{COMPASS.digits}g}")
             point[name] = min(max(rounded, low), high)
         if point not in self.points:
             self.points.append(point)

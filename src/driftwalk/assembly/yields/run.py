@@ -19,8 +19,8 @@ from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS, KEYS, Axes, make_axes
 from driftwalk.assembly.yields.arms import Arms, Ranges, Runs, Stores
 from driftwalk.assembly.yields.selection import (
-    SEARCH,
-    SELECTION,
+    COMPASS,
+    HALVING,
     Selection,
     compass_search,
     halving,
@@ -28,7 +28,7 @@ from driftwalk.assembly.yields.selection import (
 )
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import proportion_interval
-from driftwalk.core.progress import Progress, tell_nobody
+from driftwalk.core.progress import Progress, ignore_progress
 from driftwalk.schema.check import build_dataset
 from driftwalk.sweep import threads_of_unit
 
@@ -74,7 +74,7 @@ def maximise_yield(
 ) -> xr.Dataset:
     """Find the setting in which most runs assemble into a target by a time.
 
-    Successive halving chooses among the settings, a local search refines those of `ranges`, and
+    Successive halving chooses among the settings, a local search refines the ones of `ranges`, and
     further runs distinguish what is near the best. Run k of every setting has the same random
     numbers. The yield is reported from fresh runs, which chose nothing.
 
@@ -103,7 +103,7 @@ def maximise_yield(
     indifference : float
         Difference of yields that does not matter, in (0, 1).
     store : callable, optional
-        Returns the store of a sweep by its name and settings, such as that of a run directory.
+        Returns the store of a sweep by its name and settings, for example of a run directory.
     progress : callable, optional
         Called with the number of finished runs and of all that may be needed.
     threads : int, optional
@@ -150,11 +150,11 @@ def maximise_yield(
     )  # fmt: skip
     searched = runs if arms.ranges else 0
     reported_arms = 1 + YIELD_POLICY.alike + YIELD_POLICY.on_front
-    whole = runs + searched + SELECTION.most * runs + reported_arms * fresh_runs
+    whole = runs + searched + HALVING.most * runs + reported_arms * fresh_runs
     before = 0
 
     def told(done: int) -> None:
-        (progress or tell_nobody)(min(before + done, whole), whole)
+        (progress or ignore_progress)(min(before + done, whole), whole)
 
     how: dict[str, Any] = {"store": store, "executor": executor, "progress": told}
     chosen = Runs(arms, name, moment, trial=FIRST_TRIALS.choice, name="choose", **how)
@@ -169,7 +169,7 @@ def maximise_yield(
     known = [arm for arm in range(len(arms.points)) if tally.size(arm)]
     selected = tell_apart(
         tally, known, indifference=indifference, confidence=confidence,
-        budget=SELECTION.most * runs,
+        budget=HALVING.most * runs,
     )  # fmt: skip
     before = chosen.done
     # A setting that was chosen for its runs was lucky in them: its yield comes from others.
@@ -256,8 +256,8 @@ def _prepared(
     )  # fmt: skip
     many = len(arms.points)
     each = numbers[0] // (many * max(math.ceil(math.log2(many)), 1))
-    if each < SELECTION.least_runs:
-        needed = SELECTION.least_runs * many * max(math.ceil(math.log2(many)), 1)
+    if each < HALVING.least_runs:
+        needed = HALVING.least_runs * many * max(math.ceil(math.log2(many)), 1)
         raise InputError(
             f"{many} settings need at least {needed} runs, got {numbers[0]} (runs): give more runs "
             "or fewer values"
@@ -284,11 +284,11 @@ def _arms(
             raise InputError(f"{name} has values and a range: give one")
         if not 0 <= low < high < math.inf:
             raise InputError(f"ranges: {name} needs two numbers from 0 on, the lower one first")
-        least = SEARCH.points * 10.0 ** (math.floor(math.log10(high)) + 1 - SEARCH.digits)
+        least = COMPASS.points * 10.0 ** (math.floor(math.log10(high)) + 1 - COMPASS.digits)
         if high - low < least:
             raise InputError(
                 f"ranges: {name} from {low:.9g} to {high:.9g} is too narrow, as settings have "
-                f"{SEARCH.digits} digits: make it at least {least:g} wide"
+                f"{COMPASS.digits} digits: make it at least {least:g} wide"
             )
     if not listed.values and not ranges:
         raise InputError(f"nothing varies: name settings to compare, out of {', '.join(KEYS)}")

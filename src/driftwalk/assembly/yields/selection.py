@@ -20,7 +20,7 @@ Sample = Callable[[Sequence[int], range], Bools]
 """Whether runs reached the target, shape (arm, run), of some arms and the runs of a range."""
 
 
-class SelectionPolicy(NamedTuple):
+class HalvingPolicy(NamedTuple):
     """How many runs an arm gets, and when arms are distinguished."""
 
     least_runs: int = 20
@@ -34,7 +34,7 @@ class SelectionPolicy(NamedTuple):
     by hand."""
 
 
-SELECTION: Final = SelectionPolicy()
+HALVING: Final = HalvingPolicy()
 
 
 class Difference(NamedTuple):
@@ -51,7 +51,7 @@ class Difference(NamedTuple):
         The normal mixture of Robbins (1970), with the estimated variance.
         """
         tuned = -2.0 * math.log(level)
-        rho = (tuned + math.log(tuned + 1.0)) / SELECTION.tuned_runs
+        rho = (tuned + math.log(tuned + 1.0)) / HALVING.tuned_runs
         t = self.runs * rho + 1.0
         spread = 2.0 * self.variance * t / (self.runs**2 * rho)
         return math.sqrt(spread * math.log(math.sqrt(t) / level))
@@ -92,7 +92,7 @@ class Tally:
         return sum(max(runs - self.size(arm), 0) for arm in arms)
 
     def extend(self, arms: Sequence[int], runs: int) -> None:
-        """Simulate until each of some arms has so many runs at least."""
+        """Simulate until each of some arms has a number of runs at least."""
         for have in sorted({self.size(arm) for arm in arms if self.size(arm) < runs}):
             same = [arm for arm in arms if self.size(arm) == have]
             for arm, found in zip(same, self._sample(same, range(have, runs)), strict=True):
@@ -191,7 +191,7 @@ def tell_apart(
             return Selection(best, _ranked(tally, apart), indifference)
         sizes = [tally.size(arm) for arm in (best, *unsettled)]
         fewest, most = min(sizes), max(sizes)
-        target = min(2 * fewest, most) if fewest < most else math.ceil(SELECTION.growth * most)
+        target = min(2 * fewest, most) if fewest < most else math.ceil(HALVING.growth * most)
         target = min(target, max(needed[arm] for arm in unsettled))
         wanted = [arm for arm in (best, *unsettled) if tally.size(arm) < target]
         if tally.cost(wanted, target) > end - tally.runs:
@@ -215,7 +215,7 @@ def leader(tally: Tally, arms: Sequence[int]) -> int:
     return max(arms, key=low)
 
 
-class SearchPolicy(NamedTuple):
+class CompassPolicy(NamedTuple):
     """Steps and runs of the local search."""
 
     points: int = 16
@@ -232,16 +232,16 @@ class SearchPolicy(NamedTuple):
     """Digits of a setting: more than anyone can set; chosen by hand."""
 
 
-SEARCH: Final = SearchPolicy()
+COMPASS: Final = CompassPolicy()
 
 
 def starting_points(dimensions: int) -> Floats:
     """Return the points that begin a search, in the unit cube, shape (point, dimension)."""
     from scipy.stats import qmc
 
-    drawn: Floats = qmc.Sobol(dimensions, scramble=False).random(2 * SEARCH.points)
+    drawn: Floats = qmc.Sobol(dimensions, scramble=False).random(2 * COMPASS.points)
     # The first half has the corner at zero and few other levels.
-    return drawn[SEARCH.points :]
+    return drawn[COMPASS.points :]
 
 
 def compass_search(
@@ -269,8 +269,8 @@ def compass_search(
         The arm where it ended.
     """
     at, here = begin, arm_at(begin)
-    step, runs, end = SEARCH.first_step, SEARCH.runs, tally.runs + budget
-    while step >= SEARCH.last_step:
+    step, runs, end = COMPASS.first_step, COMPASS.runs, tally.runs + budget
+    while step >= COMPASS.last_step:
         moves = [sign * step * axis for axis in np.eye(at.size) for sign in (1.0, -1.0)]
         places = {arm_at(place): place for place in (np.clip(at + one, 0.0, 1.0) for one in moves)}
         places.pop(here, None)

@@ -44,7 +44,7 @@ def bootstrap_estimates(
     # Of fewer, a bias and a scatter would be chance; the covariance's own error stands in.
     if len(found) < POSTERIOR.fewest_estimates:
         none = np.zeros(sample.shape[1])
-        return BootstrapEstimates(discrepancies, none, none + emulator.widening)
+        return BootstrapEstimates(discrepancies, none, none + emulator.error_inflation)
     errors = np.array([one.setting for one in found]) - chosen
     spread = errors.std(axis=0) / sample.std(axis=0)
     return BootstrapEstimates(discrepancies, errors.mean(axis=0), np.maximum(spread, 1.0))

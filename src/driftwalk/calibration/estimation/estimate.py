@@ -25,7 +25,7 @@ from driftwalk.calibration.estimation.posterior import (
 )
 from driftwalk.calibration.estimation.regression_abc import REGRESSION, Order, sequential_regression
 from driftwalk.calibration.evolution import distinct
-from driftwalk.calibration.held_out.law_findings import Misfit
+from driftwalk.calibration.held_out.law_findings import Discrepancy
 from driftwalk.core.arrays import Bools, Floats
 
 Starts = Callable[[], Floats]
@@ -40,13 +40,13 @@ class MatchingPolicy(NamedTuple):
     """Discrepancy per summary up to which no other start is tried; chosen by hand."""
     apart: float = 0.04
     """Least root-mean-square distance of two starts, in parts of the ranges. Chosen by hand."""
-    hopeless: float = 100.0
+    no_restart_above: float = 100.0
     """Discrepancy per summary from which on another start is no use: it is another model; chosen by
     hand."""
     unsettled: float = 1.0
     """Last move of a mean, in standard deviations, above which it is not determined; chosen by
     hand."""
-    unlike: float = 4.0
+    undetermined_above: float = 4.0
     """Discrepancy, in medians of the model's own, above which nothing is determined: intervals
     would be more than twice as wide. Measured: a wrong model on a recorded mouse had 30."""
     as_close: float = 1.25
@@ -69,14 +69,14 @@ class Summaries(Simulate, Protocol):
 
 
 class Matched(NamedTuple):
-    """The setting whose summaries match those of the recording."""
+    """The setting whose summaries match the recording."""
 
     point: Floats
     """In the unit cube."""
     sample: Floats
     """Settings that could have given the recording, shape (draws, parameters)."""
-    misfit: Misfit
-    """How far the summaries are from those of the model's own recordings."""
+    discrepancy: Discrepancy
+    """How far the summaries are from the model's own recordings."""
     stretch: float
     """Factor by which the draws are spread for what the model leaves unexplained, from 1 on."""
     even_point: Floats
@@ -90,10 +90,10 @@ class Matched(NamedTuple):
     """and those whose draws still moved when the last simulations were made."""
 
     @property
-    def unlike(self) -> bool:
+    def undetermined(self) -> bool:
         """Whether the summaries are so far from the model's that it can determine nothing."""
-        far = self.misfit.value > MATCHING.unlike * self.misfit.median
-        return far and not self.misfit.usual
+        far = self.discrepancy.value > MATCHING.undetermined_above * self.discrepancy.median
+        return far and not self.discrepancy.usual
 
 
 def most_simulations(parameters: int, replicates: int) -> int:
@@ -115,7 +115,7 @@ def match_summaries(
     replicates: int,
     seed: int,
 ) -> Matched:
-    """Find the setting whose summaries match those of a recording."""
+    """Find the setting whose summaries match a recording."""
     recorded = objective.recorded
     optima = find_optima(objective, parameters, starts, order=order, seed=seed)
     modes = find_modes(
@@ -128,15 +128,15 @@ def match_summaries(
         lambda one: objective(one, parts=1)[:, 0], modes.best, replicates
     )
     best = modes.best
-    misfit = Misfit.of(best.solution.discrepancy, bootstrap.discrepancies)
+    discrepancy = Discrepancy.of(best.solution.discrepancy, bootstrap.discrepancies)
     # What the model leaves unexplained widens the draws, as a reduced chi-square above one does.
-    stretch = 1.0 if misfit.usual else float(np.sqrt(misfit.value / misfit.median))
+    stretch = 1.0 if discrepancy.usual else float(np.sqrt(discrepancy.value / discrepancy.median))
     wider = stretch * bootstrap.spread
     each = [order(_corrected(one.sample, bootstrap.bias, wider)) for one in modes.places]
     return Matched(
         point=np.median(each[0], axis=0),
         sample=modes.mixed(each),
-        misfit=misfit,
+        discrepancy=discrepancy,
         stretch=stretch,
         even_point=np.clip(best.others[0].setting, 0.0, 1.0),
         profiles=_profiles(order, best, recorded[0], bootstrap.bias, wider),
@@ -152,17 +152,17 @@ def find_optima(
     *,
     order: Order,
     seed: int,
-    hopeless: float = MATCHING.hopeless,
+    no_restart_above: float = MATCHING.no_restart_above,
     give_up: float = np.inf,
 ) -> list[LocalOptimum]:
     """Return the ends of the searches that are worth a posterior, the most likely first.
 
-    The arguments are those of `match_summaries`, the discrepancy, in summaries, from which on no
-    other start is tried, and that from which on a search is not worth its end (see
+    The arguments are as of `match_summaries`, with two limits on the discrepancy in summaries:
+    above `no_restart_above` no other start is tried, and above `give_up` a search is given up (see
     `minimise_discrepancy`). The first search begins where a regression puts the parameters. Even
-    where its errors are large, its centre is closer to the truth than they say: they are mostly
-    those of settings that move unlike the recording. Where the end does not match, the model has
-    more than one place to look, and an end that matches may not be the best that does.
+    where its errors are large, its centre is closer to the truth than they say: they come mostly
+    from settings that move unlike the recording. Where the end does not match, the model has more
+    than one place to look, and an end that matches may not be the best that does.
     """
     recorded = objective.recorded[0]
     regression = sequential_regression(
@@ -176,7 +176,7 @@ def find_optima(
         )
 
     found = [search(1, regression.centre, width)]
-    if found[0].discrepancy < MATCHING.matches or found[0].discrepancy > hopeless:
+    if found[0].discrepancy < MATCHING.matches or found[0].discrepancy > no_restart_above:
         return found
     wide = np.full(parameters, GAUSS_NEWTON.widest)
     further = islice(distinct(order(starts()), MATCHING.apart), MATCHING.most_starts)

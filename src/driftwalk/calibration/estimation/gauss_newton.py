@@ -32,7 +32,7 @@ class GaussNewtonPolicy(NamedTuple):
     chosen by hand."""
     most_rounds: int = 12
     """A bound on the time; chosen by hand."""
-    most_in_vain: int = 4
+    patience: int = 4
     """Rounds without a better fit after which the search ends; chosen by hand."""
     reach: float = 1.25
     """A solution may lie this far from the centre, in half-widths of the trust region; chosen by
@@ -97,10 +97,10 @@ def minimise_discrepancy(
 ) -> LocalOptimum:
     """Go from a start to the setting that fits the summaries of a recording best.
 
-    Every round draws settings from a box, simulates them, and solves for the recording by the
-    emulator that they give (Gauss and Newton's way, with derivatives from a regression). The next
-    box lies about the solution, a few standard deviations wide; where the model is far from the
-    recording the deviations are enlarged by the discrepancy.
+    Every round draws settings from a trust region, simulates them, and solves for the recording by
+    the emulator that they give (Gauss and Newton's way, with derivatives from a regression). The
+    next trust region lies about the solution, a few standard deviations wide; where the model is
+    far from the recording the deviations are enlarged by the discrepancy.
     """
     policy = GAUSS_NEWTON
     centre, width = start, np.clip(width, policy.narrowest, policy.widest)
@@ -127,15 +127,15 @@ def minimise_discrepancy(
         # A quadratic that holds badly leaves much, and then a large discrepancy looks small.
         since = 0 if optimum.deviance < lowest else since + 1
         lowest = min(lowest, optimum.deviance)
-        hopeless = number + 1 >= policy.fewest_rounds and least > give_up
-        if settled or hopeless or since == policy.most_in_vain:
+        given_up = number + 1 >= policy.fewest_rounds and least > give_up
+        if settled or given_up or since == policy.patience:
             break
         centre, width = rounded(np.clip(solution.setting, 0.0, 1.0)), rounded(following)
     return optimum
 
 
 def simulations_of(parameters: int) -> tuple[int, int]:
-    """Return how many settings are simulated in a box, and in the last one: powers of two.
+    """Return how many settings are simulated in a trust region, and in the last one: powers of two.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def simulations_of(parameters: int) -> tuple[int, int]:
 
 
 def drawn_settings(centre: Floats, width: Floats, count: int, seed: int) -> Floats:
-    """Return settings that fill the box, or its part in the unit cube."""
+    """Return settings that fill the trust region, or its part in the unit cube."""
     from scipy.stats import qmc
 
     low, high = np.maximum(centre - width, 0.0), np.minimum(centre + width, 1.0)

@@ -8,8 +8,8 @@ over the ranges on their scales (emcee; Foreman-Mackey et al., Publ. Astron. Soc
 
 The region is an ellipsoid about the draws, along their own axes: parameters that make up for each
 other lie on a narrow ridge, and a box about it is mostly empty of draws. A chain that begins at one
-place that fits does not find the others, so every search that ends at a match has a posterior of
-its own; these modes are weighed by their evidence, the likelihood there times the volume that the
+place that fits does not find the others, so every search that ends at a match has its own
+posterior; these modes are weighed by their evidence, the likelihood there times the volume that the
 draws fill.
 """
 
@@ -30,7 +30,7 @@ from driftwalk.calibration.evolution import rounded
 from driftwalk.core.arrays import Bools, Floats
 
 
-class RegionPolicy(NamedTuple):
+class SimulatedRegionPolicy(NamedTuple):
     """How large the region is that is simulated for a posterior sample. Chosen by hand."""
 
     spread: float = 1.5
@@ -44,7 +44,7 @@ class RegionPolicy(NamedTuple):
     hand."""
 
 
-REGION: Final = RegionPolicy()
+SIMULATED_REGION: Final = SimulatedRegionPolicy()
 
 
 class Region(NamedTuple):
@@ -97,15 +97,15 @@ def radius_of(parameters: int) -> float:
     >>> round(radius_of(2), 3)
     3.0
     """
-    return REGION.spread * float(np.sqrt(parameters + 2.0))
+    return SIMULATED_REGION.spread * float(np.sqrt(parameters + 2.0))
 
 
 def region_about(sample: Floats) -> Region:
     """Return the region of draws."""
     parameters = sample.shape[1]
     covariance = np.atleast_2d(np.cov(sample.T))
-    covariance += REGION.narrowest**2 * np.eye(parameters)
-    most = REGION.widest / radius_of(parameters)
+    covariance += SIMULATED_REGION.narrowest**2 * np.eye(parameters)
+    most = SIMULATED_REGION.widest / radius_of(parameters)
     shrink = np.minimum(1.0, most / np.sqrt(np.diag(covariance)))
     covariance *= np.outer(shrink, shrink)
     root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
@@ -214,7 +214,7 @@ def _stayed(moved: Floats, std: Floats, region: Region) -> bool:
     A parameter along which the region cannot grow is as wide as it will be.
     """
     alike = (std < POSTERIOR.alike * region.std) | (
-        region.width > POSTERIOR.as_wide * REGION.widest
+        region.width > POSTERIOR.as_wide * SIMULATED_REGION.widest
     )
     return bool((np.abs(moved) < POSTERIOR.stays * std).all() and alike.all())
 

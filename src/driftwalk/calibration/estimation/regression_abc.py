@@ -1,9 +1,9 @@
 """Sequential regression ABC: the part of the ranges in which a recording's parameters lie.
 
-Settings are drawn from a box and simulated, and their parameters are regressed on their summaries,
-the simulations near the recording counting most. The parameters that the regression gives the
-recording, and its errors on simulations that it has not used, make the next box. Nothing is
-minimised, so there is no local minimum to end in.
+Settings are drawn from a trust region and simulated, and their parameters are regressed on their
+summaries, the simulations near the recording counting most. The parameters that the regression
+gives the recording, and its errors on simulations that it has not used, make the next trust region.
+Nothing is minimised, so there is no local minimum to end in.
 """
 
 from __future__ import annotations
@@ -32,13 +32,15 @@ class RegressionPolicy(NamedTuple):
     most_rounds: int = 6
     """A bound on the time; chosen by hand."""
     wide_errors: float = 2.5
-    """Half-width of the next box in standard errors: chance goes beyond it once in a hundred."""
+    """Half-width of the next trust region in standard errors: chance goes beyond it once in a
+    hundred."""
     narrow: float = 0.05
-    """Errors, in parts of the ranges, at which a quadratic holds in the box; chosen by hand."""
+    """Errors, in parts of the ranges, at which a quadratic holds in the trust region; chosen by
+    hand."""
     lost: float = 0.2
     """Larger errors say next to nothing: a uniform distribution has 0.29 in closed form."""
     ridges: tuple[float, ...] = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
-    """Ridge penalties that are tried; each parameter takes that of the least error; chosen by
+    """Ridge penalties that are tried; each parameter takes the one of the least error; chosen by
     hand."""
     bounded: float = 2.0
     """Summaries count as at most this many standard deviations from the usual; chosen by hand."""
@@ -72,7 +74,7 @@ class RegressionEstimate(NamedTuple):
 def sequential_regression(
     simulate: Simulate, recorded: Floats, parameters: int, *, order: Order, seed: int
 ) -> RegressionEstimate:
-    """Return the box in which the parameters of a recording lie.
+    """Return the trust region in which the parameters of a recording lie.
 
     Examples
     --------
@@ -118,8 +120,7 @@ def _require_change(summaries: Floats) -> None:
 def _ridge_regression(settings: Floats, summaries: Floats, recorded: Floats) -> RegressionEstimate:
     """Return the parameters that a regression on summaries gives a recording, and its errors.
 
-    Of several ridges each parameter has that of the smallest error; errors are those of leaving
-    one simulation out.
+    Each parameter takes the ridge of the smallest leave-one-out error.
     """
     spread = summaries.std(axis=0)
     used = spread > 0.0

@@ -61,17 +61,17 @@ def estimate(entry: Candidate, motion: RecordedMotion, how: Execution) -> Estima
     """Estimate the parameters of a model, and judge it on blocks of time that it has not seen.
 
     Two stages. One searches the even blocks of time by six two-dimensional KS distances. The other
-    matches summaries of the whole recording. Where these are like those of the model's own
-    recordings, the search is not needed. Where they are not, both are made, and the answer of the
-    summaries counts only if it is as close in the six distances: summaries that a model cannot give
-    at once pull it away from the motion. It determines parameters only if the discrepancy is not
-    more than four times the usual one: values of another model are no measurement.
+    matches summaries of the whole recording. Where these are like the model's own recordings, the
+    search is not needed. Where they are not, both are made, and the answer of the summaries counts
+    only if it is as close in the six distances: summaries that a model cannot give at once pull it
+    away from the motion. It determines parameters only if the discrepancy is not more than four
+    times the usual one: values of another model are no measurement.
     """
     stages = _Stages(entry, motion, how)
     require_numbers(stages.even)
     order = stages.order
     matched = stages.matched() if motion.replicates > 1 else None
-    if matched is None or not matched.misfit.usual:
+    if matched is None or not matched.discrepancy.usual:
         stages.optima()
     answers = {
         **({} if stages.best is None else {"searched": order(stages.best[None])[0]}),
@@ -89,7 +89,7 @@ def estimate(entry: Candidate, motion: RecordedMotion, how: Execution) -> Estima
     if matched is not None and counts:
         confidence = motion.study.calibration.confidence
         known = determination(matched.sample, entry.ranges, confidence=confidence)
-        open_ones = matched.ambiguous | matched.unsettled | matched.unlike
+        open_ones = matched.ambiguous | matched.unsettled | matched.undetermined
         known = known._replace(determined=known.determined & ~open_ones)
     # The odd blocks judge the better answer that has not seen them.
     unseen = [name for name in ("searched", "even")[: 1 + counts] if name in answers]
@@ -116,7 +116,7 @@ def _counts(matched: Matched | None, scores: Mapping[str, float]) -> bool:
     """
     if matched is None:
         return False
-    return matched.misfit.usual or scores["matched"] <= MATCHING.as_close * scores["searched"]
+    return matched.discrepancy.usual or scores["matched"] <= MATCHING.as_close * scores["searched"]
 
 
 class _Stages:
@@ -229,8 +229,10 @@ def build_model_calibration(
 ) -> xr.Dataset:
     """Return the dataset of a calibration of many parameters."""
     ranges, held_out = entry.ranges, found.held_out
-    misfit = None if found.matched is None else found.matched.misfit
-    against, unable = law_findings(entry, held_out, motion, misfit=misfit, bouts=found.bouts)
+    discrepancy = None if found.matched is None else found.matched.discrepancy
+    against, unable = law_findings(
+        entry, held_out, motion, discrepancy=discrepancy, bouts=found.bouts
+    )
     if (ended := entry.at_range_end(found.point)) is not None:
         unable.append(ended)
     verdict = verdict_of(against, unable)
@@ -300,17 +302,17 @@ def _stages(found: Estimation, entry: Candidate) -> dict[str, Any]:
     matched = found.matched
     if matched is not None:
         data |= {
-            "draws": (("draw", "parameter"), _values(entry, matched.sample)),
+            "posterior_sample": (("draw", "parameter"), _values(entry, matched.sample)),
             "matched_score": ((), found.scores["matched"]),
-            "misfit": ((), matched.misfit.value),
-            "usual_misfit": ((), matched.misfit.median),
-            "most_misfit": ((), matched.misfit.upper),
+            "discrepancy": ((), matched.discrepancy.value),
+            "discrepancy_median": ((), matched.discrepancy.median),
+            "discrepancy_q95": ((), matched.discrepancy.upper),
             "interval_stretch": ((), matched.stretch),
         }
         if matched.profiles is not None:
             values = _values(entry, matched.profiles.place.T).T
             data["profile_value"] = (("parameter", "profile_point"), values)
-            data["profile_misfit"] = (("parameter", "profile_point"), matched.profiles.rise)
+            data["profile_discrepancy"] = (("parameter", "profile_point"), matched.profiles.rise)
     return data
 
 
@@ -335,15 +337,16 @@ def _said(found: Estimation, entry: Candidate) -> list[str]:
         return said
     if found.known is None:
         said.append(
-            "the summaries of the motion pull the model away from it: in the six distances their "
-            f"answer comes to {found.scores['matched']:.2f} noise floors, that of the search to "
+            "the summaries of the motion lead to a worse fit: their estimate is "
+            f"{found.scores['matched']:.2f} noise floors off in the six distances, the search's "
             f"{found.scores['searched']:.2f}; the values are the search's, and none is determined"
         )
         return said
-    if not matched.misfit.usual:
+    if not matched.discrepancy.usual:
         said.append(
-            f"the intervals are {matched.stretch:.1f} times as wide as the draws, for what the "
-            f"model leaves of the summaries{'; nothing is determined' if matched.unlike else ''}"
+            f"the intervals are {matched.stretch:.1f} times as wide as the posterior sample, "
+            "because the model does not explain all of the "
+            f"summaries{'; nothing is determined' if matched.undetermined else ''}"
         )
     names = np.array([one.name for one in entry.ranges])
     if matched.ambiguous.any():

@@ -1,13 +1,14 @@
 """Synthetic likelihood of the summaries of a recording: by a local emulator, and at one setting.
 
-The emulator says how summaries depend on a model's parameters in a small box, from simulations
-there. Their means are linear or quadratic functions of the parameters, as the simulations support;
-what is left has a covariance. Where that is so, the setting of a recording is that of least
-squares, each summary weighed by its covariance: the maximum of the synthetic likelihood (Wood,
-Nature 466 (2010) 1102).
+The emulator says how summaries depend on a model's parameters in a small trust region, from
+simulations there. Their means are linear or quadratic functions of the parameters, as the
+simulations support; what is left has a covariance. Where that is so, the setting of a recording is
+the least-squares one, each summary weighed by its covariance: the maximum of the synthetic
+likelihood (Wood, Nature 466 (2010) 1102).
 
-An emulator's covariance holds what its quadratic misses, and differs from box to box. So models are
-compared without one: by simulations of one setting each, all with the same number of them.
+An emulator's covariance holds what its quadratic misses, and differs from one trust region to the
+next. So models are compared without one: by simulations of one setting each, all with the same
+number of them.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ class Solution(NamedTuple):
     setting: Floats
     """In the unit cube, shape (parameters,)."""
     place: Floats
-    """The same in the box: 0 is its centre, 1 its end."""
+    """The same in the trust region: 0 is its centre, 1 its boundary."""
     discrepancy: float
     """Sum of the squares of what is left, in standard deviations."""
     std: Floats
@@ -58,12 +59,12 @@ class Solution(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LocalEmulator:
-    """The summaries of a model in a box.
+    """The summaries of a model in a trust region.
 
     Attributes
     ----------
     centre, width : ndarray, shape (parameters,)
-        The box, in the unit cube.
+        The trust region, in the unit cube.
     form : {"slopes", "squares", "products"}
         What is fitted.
     coefficients : ndarray, shape (summaries, coefficients)
@@ -85,7 +86,7 @@ class LocalEmulator:
     freedom: int
 
     @property
-    def widening(self) -> float:
+    def error_inflation(self) -> float:
         """Factor by which errors are larger than the likelihood says.
 
         The covariance of the summaries comes from simulations. Its inverse is too large on average
@@ -164,7 +165,7 @@ class LocalEmulator:
             bounds=(low, high),
             max_nfev=40,
         )
-        # A box as wide as its standard deviation keeps the inverse finite.
+        # A trust region as wide as its standard deviation keeps the inverse finite.
         slopes = slope(found.x)
         curvature = slopes.T @ slopes + np.eye(begin.size)
         return Solution(
@@ -212,8 +213,8 @@ def shrunk_correlation(scaled: Floats, freedom: int) -> Floats:
 def _best_form(place: Floats, summaries: Floats) -> Form:
     """Return the form that foretells simulations best which it has not seen.
 
-    Coefficients that a box does not need cost: nine parameters have 36 products, and with 256
-    simulations their errors are larger than what they describe.
+    Coefficients that a trust region does not need cost: nine parameters have 36 products, and with
+    256 simulations their errors are larger than what they describe.
     """
     # Fewer than four simulations for each coefficient determine none of them well.
     tried = [one for one in FORMS if len(place) >= 4 * _basis(place[:1], one).shape[1]] or [
@@ -261,7 +262,7 @@ def _basis_slope(place: Floats, form: Form) -> Floats:
 
 
 class SyntheticLikelihood(NamedTuple):
-    """Summaries of a recording, compared with those of simulations of one setting."""
+    """Summaries of a recording, compared with simulations of one setting."""
 
     discrepancy: float
     """Sum of squares of the deviations of the recording's summaries, in standard deviations."""
@@ -274,7 +275,7 @@ class SyntheticLikelihood(NamedTuple):
 def synthetic_likelihood_at(
     simulate: Callable[[Floats], Floats], recorded: Floats, setting: Floats, replicates: int
 ) -> SyntheticLikelihood:
-    """Compare a recording's summaries with those of simulations of one setting.
+    """Compare a recording's summaries with simulations of one setting.
 
     Examples
     --------

@@ -275,10 +275,10 @@ class Region(NamedTuple):
     """Where the true parameters may be."""
 
     intervals: tuple[tuple[float, float], ...]
-    """Coordinates of the ends, one pair per parameter."""
+    """Coordinates of the bounds, one pair per parameter."""
     border: Floats
     """Border of the joint region, shape (vertices, parameters): a closed line for two parameters,
-    the two ends for one."""
+    the two bounds for one."""
     level: float
     """The smooth surface is below it in the region."""
 
@@ -312,17 +312,17 @@ def confidence_region(
 
 
 def _interval(axis: Floats, profile: Floats, level: float) -> tuple[float, float]:
-    """Return the ends of what lies below the level, between lattice points by interpolation."""
+    """Return the bounds of what lies below the level, between lattice points by interpolation."""
     below = np.flatnonzero(profile <= level)
-    ends = []
+    bounds = []
     for inner, step in ((below[0], -1), (below[-1], 1)):
         outer = inner + step
         if not 0 <= outer < axis.size:
-            ends.append(float(axis[inner]))
+            bounds.append(float(axis[inner]))
             continue
         share = (level - profile[inner]) / (profile[outer] - profile[inner])
-        ends.append(float(axis[inner] + share * (axis[outer] - axis[inner])))
-    return ends[0], ends[1]
+        bounds.append(float(axis[inner] + share * (axis[outer] - axis[inner])))
+    return bounds[0], bounds[1]
 
 
 def _largest_contour(lattice: Axes, surface: Floats, level: float) -> Floats:

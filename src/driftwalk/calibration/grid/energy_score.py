@@ -11,7 +11,7 @@ the energy score of Gneiting and Raftery (J. Am. Stat. Assoc. 102, 359, 2007) wi
 distance: no setting has a smaller expectation than the truth. Chance in S grows with the floor, so
 its height above the minimum is counted in floors.
 
-Distances are noisy, so the optimum is that of a smooth surface, instead of the luckiest cell. At
+Distances are noisy, so the optimum is taken on a smooth surface, instead of the luckiest cell. At
 every point of a fine lattice a quadratic in the n parameters, (n + 1)(n + 2) / 2 terms, is fitted
 to the distances of the cells nearby, weighted by (1 - r^2/4)^3 for r < 2 bandwidths, and its value
 there is the surface. The fit is linear in the data: one matrix serves the recording and every

@@ -310,13 +310,13 @@ class SweepProgress:
         self._say, self._share_of, self._finished = say, share_of, 0
 
     def __call__(self, done: int, total: int) -> None:
-        """Tell how much is done when so many settings of a sweep are."""
+        """Report progress by the settings of a sweep that are done."""
         share = self._share_of([*[1.0] * self._finished, done / max(total, 1)])
         self._finished += done >= total
         self._say(round(1000 * share), 1000)
 
 
 def window_id(window: Axes) -> str:
-    """Name a grid by its ends and sizes, so that a moved window has a store of its own."""
+    """Name a grid by its ends and sizes, so that a moved window has its own store."""
     ends = [f"{axis[0]:.6g}-{axis[-1]:.6g}-{axis.size}" for axis in window]
     return "x".join(ends).replace(".", "p").replace("+", "")

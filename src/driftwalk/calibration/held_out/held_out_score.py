@@ -128,7 +128,7 @@ def without_error(without: Floats) -> float:
     return float(np.sqrt((count - 1) / count * ((without - without.mean()) ** 2).sum()))
 
 
-class VerdictPolicy(NamedTuple):
+class HeldOutVerdictPolicy(NamedTuple):
     """When a model explains a recording."""
 
     most_over_own: float = 2.0
@@ -150,7 +150,7 @@ class VerdictPolicy(NamedTuple):
     convention."""
 
 
-VERDICT: Final = VerdictPolicy()
+HELD_OUT_VERDICT: Final = HeldOutVerdictPolicy()
 
 
 def held_out_differences(
@@ -167,20 +167,24 @@ def held_out_differences(
         f"{ASPECT_WORDS[motion.held.names[k]]}: D = {held_out.held[k]:.3f}, "
         f"the recording's own parts {motion.own[k]:.3f}"
         for k in np.argsort(-over)
-        if over[k] > VERDICT.most_over_own
+        if over[k] > HELD_OUT_VERDICT.most_over_own
     ]
-    if np.count_nonzero(off) > VERDICT.most_checks_off:
+    if np.count_nonzero(off) > HELD_OUT_VERDICT.most_checks_off:
         names = [words for words, is_off in zip(CHECK_WORDS.values(), off, strict=True) if is_off]
-        found.append(f"far beyond all its worlds: {', '.join(names)}")
+        found.append(f"far beyond all its replicates: {', '.join(names)}")
     return found
 
 
-def checks_off(worlds: Floats, recorded: Floats) -> Bools:
-    """Return which facts of a recording are far beyond those of all worlds, shape (checks,)."""
-    low, high = worlds.min(axis=0), worlds.max(axis=0)
+def checks_off(replicates: Floats, recorded: Floats) -> Bools:
+    """Return which facts of a recording are far beyond all replicates, shape (checks,)."""
+    low, high = replicates.min(axis=0), replicates.max(axis=0)
     share = np.array([name.endswith("_share") for name in CHECKS])
-    lowest = np.where(share, low - VERDICT.most_share_apart, low / VERDICT.most_ratio)
-    highest = np.where(share, high + VERDICT.most_share_apart, high * VERDICT.most_ratio)
+    lowest = np.where(
+        share, low - HELD_OUT_VERDICT.most_share_apart, low / HELD_OUT_VERDICT.most_ratio
+    )
+    highest = np.where(
+        share, high + HELD_OUT_VERDICT.most_share_apart, high * HELD_OUT_VERDICT.most_ratio
+    )
     with np.errstate(invalid="ignore"):
         near = (lowest <= recorded) & (recorded <= highest)
     return np.asarray(np.isfinite(recorded) & ~near)

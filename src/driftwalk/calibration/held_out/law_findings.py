@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from driftwalk.calibration.held_out.candidates import Candidate, takes_recorded_clearance
 from driftwalk.calibration.held_out.held_out_score import (
-    VERDICT,
+    HELD_OUT_VERDICT,
     HeldOutScore,
     held_out_differences,
 )
@@ -73,7 +73,7 @@ class BoutDistance(NamedTuple):
 
 
 def bout_distances(motion: RecordedMotion, worlds: Worlds) -> tuple[BoutDistance, ...]:
-    """Compare the lengths of slow and fast bouts with those of simulated recordings.
+    """Compare the lengths of slow and fast bouts with simulated recordings.
 
     A law of the family has bouts of a Weibull distribution. Rests with a power law may have the
     same distribution but for the longest: so the share of the time that the longest ones take is
@@ -117,18 +117,18 @@ def bout_sentences(found: tuple[BoutDistance, ...]) -> Iterator[str]:
     Examples
     --------
     >>> list(bout_sentences((BoutDistance("slow", 0.31, 0.14, 0.2, 0.3),)))
-    ['slow bouts last otherwise: D = 0.310, of its own recordings below 0.140']
+    ['slow bouts differ in length: D = 0.310, in the model's own recordings below 0.140']
     """
     for one in found:
         if one.distance > one.limit:
             yield (
-                f"{one.kind} bouts last otherwise: D = {one.distance:.3f}, "
-                f"of its own recordings below {one.limit:.3f}"
+                f"{one.kind} bouts differ in length: D = {one.distance:.3f}, in the model's own "
+                f"recordings below {one.limit:.3f}"
             )
         if one.tail > one.tail_limit:
             yield (
                 f"the lengths of {one.kind} bouts have a heavier tail: the longest twentieth takes "
-                f"{in_percent(one.tail)} of their time, of its own recordings below "
+                f"{in_percent(one.tail)} of their time, in the model's own recordings below "
                 f"{in_percent(one.tail_limit)}"
             )
 
@@ -175,22 +175,22 @@ def _tail_limit(simulated: Sequence[Floats]) -> float:
     return (1.0 + 1e-9) * float(np.exp(logs.mean() + sigmas * logs.std(ddof=1)))
 
 
-class MisfitPolicy(NamedTuple):
-    """Which misfit of the summaries of a motion speaks against a law."""
+class DiscrepancyPolicy(NamedTuple):
+    """Which discrepancy of the summaries of a motion speaks against a law."""
 
     usual_quantile: float = 0.95
-    """Quantile of the misfits of the law's own recordings up to which one is usual: by chance one
-    in twenty is called unlike it."""
+    """Quantile of the discrepancies of the law's own recordings up to which one is usual: by chance
+    one in twenty is called unlike it."""
     against: float = 1.5
-    """Misfit, in that quantile, from which it speaks against the law: at most 1.23 in 160
+    """Discrepancy, in that quantile, from which it speaks against the law: at most 1.23 in 160
     recordings of the law itself (studies/motion_models), 3.5 and more on wrong ones."""
 
 
-MISFIT: Final = MisfitPolicy()
+DISCREPANCY: Final = DiscrepancyPolicy()
 
 
-class Misfit(NamedTuple):
-    """How far the summaries of a recording are from those of a law's own recordings."""
+class Discrepancy(NamedTuple):
+    """How far the summaries of a recording are from a law's own recordings."""
 
     value: float
     """Sum of squares of the summaries' deviations, in standard deviations."""
@@ -200,32 +200,32 @@ class Misfit(NamedTuple):
     """and their 95 % quantile."""
 
     @classmethod
-    def of(cls, value: float, own: Floats) -> Misfit:
-        """Return the misfit of a recording, from those of the law's own recordings too."""
-        upper = float(np.quantile(own, MISFIT.usual_quantile))
+    def of(cls, value: float, own: Floats) -> Discrepancy:
+        """Return the discrepancy of a recording, with its quantiles in the law's own recordings."""
+        upper = float(np.quantile(own, DISCREPANCY.usual_quantile))
         return cls(value, float(np.median(own)), upper)
 
     @property
     def usual(self) -> bool:
-        """Whether the summaries are like those of the law's own recordings."""
+        """Whether the summaries are like the law's own recordings."""
         return self.value <= self.upper
 
     @property
     def against(self) -> bool:
         """Whether they speak against the law, and are not just less usual."""
-        return self.value > MISFIT.against * self.upper
+        return self.value > DISCREPANCY.against * self.upper
 
     def sentence(self) -> str:
         """Return it in words.
 
         Examples
         --------
-        >>> Misfit(812.3, 90.1, 140.2).sentence()
-        "summaries of the motion: a misfit of 812, that of the model's own recordings is below 140"
+        >>> Discrepancy(812.3, 90.1, 140.2).sentence()
+        "summaries of the motion: discrepancy 812, in the model's own recordings below 140"
         """
         return (
-            f"summaries of the motion: a misfit of {self.value:.0f}, that of the model's own "
-            f"recordings is below {self.upper:.0f}"
+            f"summaries of the motion: discrepancy {self.value:.0f}, in the model's own recordings "
+            f"below {self.upper:.0f}"
         )
 
 
@@ -234,15 +234,15 @@ def law_findings(
     held_out: HeldOutScore,
     motion: RecordedMotion,
     *,
-    misfit: Misfit | None,
+    discrepancy: Discrepancy | None,
     bouts: Sequence[BoutDistance] = (),
 ) -> tuple[list[str], list[str]]:
     """Return what a recording says of a law.
 
-    Against it are the aspects and facts of the odd blocks that it misses, a misfit of the summaries
-    far beyond its own limit, and bouts that last otherwise. Open is a misfit just beyond it, or in
-    a flow that has errors; whether a place near the wall fits that a doubtful clearance decides;
-    and a motion that is not steady, in a flow that is.
+    Against it are the aspects and facts of the odd blocks that it misses, a discrepancy of the
+    summaries far beyond its own limit, and bouts of other lengths. Open is a discrepancy just
+    beyond it, or in a flow that has errors; whether a place near the wall fits that a doubtful
+    clearance decides; and a motion that is not steady, in a flow that is.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def law_findings(
         How it does on the odd blocks.
     motion : RecordedMotion
         The recording.
-    misfit : Misfit or None
+    discrepancy : Discrepancy or None
         Of the summaries; None where they were not matched.
     bouts : sequence of BoutDistance
         How long bouts last.
@@ -261,16 +261,16 @@ def law_findings(
     allowed = motion.clearance_distance if recorded else 0.0
     against = held_out_differences(held_out, motion, allowed=allowed)
     unable: list[str] = []
-    if misfit is not None and not misfit.usual:
+    if discrepancy is not None and not discrepancy.usual:
         if entry.model.needs_flow:
             # Its own recordings have the flow without error.
             unable.append(
-                f"{misfit.sentence()}; errors of the flow may do that: fit flow and body together "
-                "(`driftwalk fit`)"
+                f"{discrepancy.sentence()}; errors of the flow may do that: fit flow and body "
+                "together (`driftwalk fit`)"
             )
         else:
-            (against if misfit.against else unable).append(misfit.sentence())
-    if misfit is None or not misfit.against:
+            (against if discrepancy.against else unable).append(discrepancy.sentence())
+    if discrepancy is None or not discrepancy.against:
         against += bout_sentences(tuple(bouts))
     if allowed > _wall_limit(motion):
         unable.append(
@@ -281,7 +281,7 @@ def law_findings(
     # In a flow that changes the model is not steady either.
     unable += [] if is_series(motion.like.flow) else unsteady_motion(motion)
     share = motion.recorded_checks[CHECKS.index("wall_share")]
-    if share > VERDICT.most_wall_share:
+    if share > HELD_OUT_VERDICT.most_wall_share:
         unable.insert(
             0,
             f"the body was at the wall for {in_percent(share, decimals=1)} of the time: how it "
@@ -294,4 +294,4 @@ def law_findings(
 def _wall_limit(motion: RecordedMotion) -> float:
     """Return the KS distance up to which the place near the wall is like the recording's."""
     own = dict(zip(motion.held.names, motion.own, strict=True))
-    return VERDICT.most_over_own * float(own.get("wall", np.inf))
+    return HELD_OUT_VERDICT.most_over_own * float(own.get("wall", np.inf))

@@ -250,7 +250,7 @@ class RecordedMotion:
     attrs : mapping
         Attributes of each dataset of scores on this recording.
     warnings : list of str
-        Mistakes of the tracker that were left out, and jumps of the body.
+        Outliers that were left out, and jumps of the body.
     """
 
     track: Track

@@ -46,7 +46,7 @@ from driftwalk.calibration.ranking.result import build_comparison
 from driftwalk.conditions import study_in_arena
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import CancelOnError, one_blas_thread
-from driftwalk.core.progress import Course, tell_nobody
+from driftwalk.core.progress import StagedProgress, ignore_progress
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.sweep import MemoryStore, Store, WorkUnit, collect, grid, run_sweep, threads_of_unit
 
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 
 
 def runs_in_threads(entry: Candidate) -> bool:
-    """Return whether several threads may simulate a model: nobody knows of a user's own."""
+    """Return whether several threads may simulate a model: of a user's own that is unknown."""
     return entry.baseline or isinstance(entry.model, BlockModel | ParticleModel)
 
 
@@ -184,7 +184,7 @@ class Stages:
     tell: Tell
     pool: Executor | None = None
     """Threads of this process, where there is no executor."""
-    finished: Finished = tell_nobody
+    finished: Finished = ignore_progress
     """Hears of each model that was searched and judged."""
 
     def held_out(self) -> list[HeldOutScore]:
@@ -212,7 +212,9 @@ class Stages:
         shortlist = shortlist_models(self.work.entries, held_out)
         found: dict[int, Evidence] = {}
         for number, index in enumerate(shortlist.models):
-            numbers = [self.work.entries[k].numbers for k, one in found.items() if one.misfit.usual]
+            numbers = [
+                self.work.entries[k].numbers for k, one in found.items() if one.discrepancy.usual
+            ]
             if number >= shortlist.tied and min(numbers, default=math.inf) <= (
                 self.work.entries[index].numbers
             ):
@@ -224,13 +226,13 @@ class Stages:
             for index, entry in enumerate(self.work.entries)
             if entry.baseline and not held_out_differences(held_out[index], self.work.motion)
         ]
-        if any(one.misfit.usual for one in found.values()):
+        if any(one.discrepancy.usual for one in found.values()):
             for index in walks:
                 found[index] = self._matched(len(found), index, np.empty(0), len(found) + 1)
         return found
 
     @cached_property
-    def course(self) -> Course:
+    def staged_progress(self) -> StagedProgress:
         """How far all stages are together."""
         able = [one for one in self.work.entries if not one.baseline]
         asks = self.replicates > 1
@@ -241,7 +243,7 @@ class Stages:
         # Three models are usually matched.
         summaries = 3.0 * sum(usual[-3:]) if asks else 0.0
         parts = {"models": sum(self.work.costs()), "summaries": summaries}
-        return Course(self.tell, {**parts, "figures": 0.0})
+        return StagedProgress(self.tell, {**parts, "figures": 0.0})
 
     def _each_once(self, units: Sequence[WorkUnit], retained: Store) -> Callable[[int, int], None]:
         """Return what a sweep tells its progress, which hears of each finished model once."""
@@ -272,7 +274,9 @@ class Stages:
         together = SearchProgress(
             [one.model.name for one in entries],
             self.work.costs(),
-            lambda done, names: self.course.stage("models")(done, sum(self.work.costs()), names),
+            lambda done, names: self.staged_progress.stage("models")(
+                done, sum(self.work.costs()), names
+            ),
         )
         missing = [unit.start for unit in retained.missing(units)]
         together.finished([unit.start for unit in units if unit.start not in missing])
@@ -308,7 +312,7 @@ class Stages:
         """Search models where an executor puts them: only whole ones are heard of."""
 
         def finished(done: int, total: int) -> None:
-            self.course.stage("models")(done, total)
+            self.staged_progress.stage("models")(done, total)
             look(done, total)
 
         return run_sweep(
@@ -325,7 +329,7 @@ class Stages:
         def say(done: int, most: int) -> None:
             # Most end at a quarter of the most, some there: the root gives half to either.
             inside = math.sqrt(done / most)
-            self.course.stage("summaries")(
+            self.staged_progress.stage("summaries")(
                 number + inside, planned, f"summaries of {entry.model.name}"
             )
 
@@ -387,7 +391,7 @@ def compare_models(
     budget: Budget | None = None,
     stores: Stores | None = None,
     tell: Tell | None = None,
-    finished: Finished = tell_nobody,
+    finished: Finished = ignore_progress,
 ) -> xr.Dataset:
     """Search several motion models on a recording, and say which is closest and which explains it.
 
@@ -405,10 +409,10 @@ def compare_models(
 
     A model explains the recording where, in each aspect, it is no farther from the odd blocks than
     twice the distance of the recording's own parts, made of interleaved blocks, from each other,
-    where no more than one of eight facts that are not fitted is far off, where its misfit of the
-    summaries is usual for it, and where no other one is clearly closer or likelier. Where a walk of
-    recorded steps passes all of that as well, or the summaries were not matched, or the wall was
-    hardly touched, the comparison cannot tell.
+    where no more than one of eight facts that are not fitted is far off, where its discrepancy of
+    the summaries is usual for it, and where no other one is clearly closer or likelier. Where a
+    walk of recorded steps passes all of that as well, or the summaries were not matched, or the
+    wall was hardly touched, the comparison cannot tell.
 
     Parameters
     ----------
@@ -471,12 +475,12 @@ def compare_models(
     work = Searches(entries, motion, budget or Budget())
     with thread_pool(motion.like.threads if executor is None else 1) as pool:
         stages = Stages(
-            work, motion.replicates, stores or in_memory, executor, tell or tell_nobody, pool,
+            work, motion.replicates, stores or in_memory, executor, tell or ignore_progress, pool,
             finished,
         )  # fmt: skip
         held_out = stages.held_out()
         evidence = stages.evidence(held_out)
-    stages.course.begin("figures")
+    stages.staged_progress.begin("figures")
     return build_comparison(entries, held_out, motion, warnings, evidence)
 
 

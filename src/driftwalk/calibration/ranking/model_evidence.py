@@ -26,7 +26,7 @@ from driftwalk.calibration.held_out.held_out_score import (
     held_out_differences,
     score_setting,
 )
-from driftwalk.calibration.held_out.law_findings import BoutDistance, Misfit, bout_distances
+from driftwalk.calibration.held_out.law_findings import BoutDistance, Discrepancy, bout_distances
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
@@ -42,14 +42,14 @@ class EvidencePolicy(NamedTuple):
     and one of six models is far off; chosen by hand."""
     most_models: int = 5
     """Most models that are matched: a bound on the time; chosen by hand."""
-    rival: float = 20.0
+    not_rejected_within: float = 20.0
     """Difference of deviance below which a model is not rejected: two standard errors. A deviance
     has one of 6.6, as 512 simulations give the covariance of a hundred summaries; chosen by
     hand."""
     doubt: float = 10.0
     """Difference from which a model with more numbers leaves open whether the simpler one is right:
     one standard error. The price of the numbers is in the deviance; chosen by hand."""
-    hopeless: float = 3.0
+    give_up_above: float = 3.0
     """Discrepancy per summary above which a search is given up. The true model has 0.7 to 1.2;
     wrong ones would take three times as long; chosen by hand."""
     starts: int = 2
@@ -65,8 +65,8 @@ EVIDENCE: Final = EvidencePolicy()
 class Evidence(NamedTuple):
     """The summaries of the motion, as one model gives them."""
 
-    misfit: Misfit
-    """How far the summaries are from those of the model's own recordings."""
+    discrepancy: Discrepancy
+    """How far the summaries are from the model's own recordings."""
     deviance: float
     """-2 log of the evidence, but for a constant that all models share."""
     matched: HeldOutScore | None = None
@@ -80,18 +80,18 @@ class EvidenceRanking(NamedTuple):
 
     best: int | None
     """The model that they speak for; None where no model gives them."""
-    rivals: tuple[int, ...]
+    alternatives: tuple[int, ...]
     """Others that are about as likely."""
 
     def as_good(self, entries: Sequence[Candidate], evidence: Mapping[int, Evidence]) -> list[int]:
-        """Return the rivals that are likelier than the best or have no more parameters.
+        """Return the alternatives that are likelier than the best or have no more parameters.
 
         One with more of them has to be likelier than by chance.
         """
         best = self.best
         return [
             k
-            for k in self.rivals
+            for k in self.alternatives
             if best is not None
             and (
                 evidence[k].deviance < evidence[best].deviance - EVIDENCE.doubt
@@ -132,15 +132,17 @@ def rank_by_evidence(
 ) -> EvidenceRanking:
     """Return which model the summaries speak for.
 
-    Among those that their misfit does not speak against it is the one of the largest evidence,
+    Among those that their discrepancy does not speak against it is the one of the largest evidence,
     which has a price for each parameter. Where others are equally likely, it is the one with the
     fewest numbers.
     """
-    possible = [k for k, one in evidence.items() if not (one.misfit.against or entries[k].baseline)]
+    possible = [
+        k for k, one in evidence.items() if not (one.discrepancy.against or entries[k].baseline)
+    ]
     if not possible:
         return EvidenceRanking(None, ())
     least = min(evidence[k].deviance for k in possible)
-    left = [k for k in possible if evidence[k].deviance < least + EVIDENCE.rival]
+    left = [k for k in possible if evidence[k].deviance < least + EVIDENCE.not_rejected_within]
     best = min(left, key=lambda k: (entries[k].numbers, evidence[k].deviance))
     return EvidenceRanking(best, tuple(k for k in left if k != best))
 
@@ -167,22 +169,22 @@ def ranking_sentence(
     names: Sequence[str], evidence: Mapping[int, Evidence], answer: EvidenceRanking
 ) -> str:
     """Return what the summaries of the motion say, in a sentence."""
-    discrepancies = {k: f"{names[k]} {one.misfit.value:.0f}" for k, one in evidence.items()}
+    discrepancies = {k: f"{names[k]} {one.discrepancy.value:.0f}" for k, one in evidence.items()}
     if answer.best is None:
         return (
-            "No model reproduces the summaries of the motion: the misfits are "
-            f"{', '.join(discrepancies.values())}, those of the models' own recordings below "
-            f"{max(one.misfit.upper for one in evidence.values()):.0f}"
+            "No model reproduces the summaries of the motion: the discrepancies are "
+            f"{', '.join(discrepancies.values())}, in the models' own recordings below "
+            f"{max(one.discrepancy.upper for one in evidence.values()):.0f}"
         )
-    best = evidence[answer.best].misfit
+    best = evidence[answer.best].discrepancy
     sentence = (
-        f"{names[answer.best]} is named by the summaries of the motion: a misfit of "
-        f"{best.value:.0f}, that of its own recordings is below {best.upper:.0f}"
+        f"{names[answer.best]} is named by the summaries of the motion: discrepancy "
+        f"{best.value:.0f}, in its own recordings below {best.upper:.0f}"
     )
-    if answer.rivals:
-        rivals = ", ".join(names[k] for k in answer.rivals)
-        sentence += f"; no clear difference from {rivals}, with as many numbers or more"
-    others = [k for k in evidence if k != answer.best and k not in answer.rivals]
+    if answer.alternatives:
+        alternatives = ", ".join(names[k] for k in answer.alternatives)
+        sentence += f"; no clear difference from {alternatives}, with as many numbers or more"
+    others = [k for k in evidence if k != answer.best and k not in answer.alternatives]
     if others:
         sentence += f"; less likely are {', '.join(discrepancies[k] for k in others)}"
     return sentence
@@ -225,8 +227,8 @@ def estimate_evidence(
             lambda: answer[None],
             order=label_order(entry),
             seed=motion.seed,
-            hopeless=EVIDENCE.hopeless,
-            give_up=EVIDENCE.hopeless,
+            no_restart_above=EVIDENCE.give_up_above,
+            give_up=EVIDENCE.give_up_above,
         )
         best = optima[0].solution
         setting, log_volume = rounded(np.clip(best.setting, 0.0, 1.0)), best.log_volume
@@ -234,14 +236,14 @@ def estimate_evidence(
         lambda settings: simulate(settings)[:, 0], objective.recorded[0], setting, replicates
     )
     evidence = Evidence(
-        misfit=Misfit.of(found.discrepancy, found.own_discrepancies),
+        discrepancy=Discrepancy.of(found.discrepancy, found.own_discrepancies),
         # Laplace's approximation, with a prior that is even over the ranges.
         deviance=found.discrepancy
         + found.log_variance
         - log_volume
         - parameters * float(np.log(2.0 * np.pi)),
     )
-    if entry.baseline or evidence.misfit.against:
+    if entry.baseline or evidence.discrepancy.against:
         return evidence
     worlds = objective.worlds.simulated(setting[None], HELD_OUT_REPLICATES, stage="judged")
     return evidence._replace(
@@ -251,7 +253,7 @@ def estimate_evidence(
 
 
 class _Blurred:
-    """Simulates and summarises as an objective does, and adds noise of its own."""
+    """Simulates and summarises as an objective does, and adds its own noise."""
 
     def __init__(self, objective: SummaryObjective, seed: int) -> None:
         self.recorded = objective.recorded

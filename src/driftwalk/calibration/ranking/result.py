@@ -9,7 +9,7 @@ import numpy as np
 
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
-    VERDICT,
+    HELD_OUT_VERDICT,
     HeldOutScore,
     held_out_differences,
     recording_parts,
@@ -66,7 +66,7 @@ def build_comparison(
     tied = [
         k
         for k, (difference, error) in enumerate(apart)
-        if k > closest and difference < VERDICT.tied_sigmas * error
+        if k > closest and difference < HELD_OUT_VERDICT.tied_sigmas * error
     ]
     units, values = _estimates(entries, held_out)
     stationarity = stationarity_of_motion(motion)
@@ -127,8 +127,8 @@ def _summaries(models: int, evidence: Mapping[int, Evidence], best: int | None) 
         "asked": ("model", [k in evidence for k in range(models)]),
         "named": ("model", [k == best for k in range(models)]),
     }
-    said = {k: (*one.misfit, one.deviance) for k, one in evidence.items()}
-    stored = ("misfit", "usual_misfit", "most_misfit", "unlikely")
+    said = {k: (*one.discrepancy, one.deviance) for k, one in evidence.items()}
+    stored = ("discrepancy", "discrepancy_median", "discrepancy_q95", "deviance")
     for place, name in enumerate(stored):
         values = [said[k][place] if k in said else np.nan for k in range(models)]
         data[name] = ("model", values)
@@ -170,9 +170,9 @@ def _findings(
 ) -> list[str]:
     """Return what the answer follows from, in sentences."""
     found = [f"{names[closest]} is the closest in distance"]
-    rivals = [names[k] for k in tied if not entries[k].baseline]
-    if rivals:
-        found[0] += f"; no clear difference from {', '.join(rivals)}"
+    alternatives = [names[k] for k in tied if not entries[k].baseline]
+    if alternatives:
+        found[0] += f"; no clear difference from {', '.join(alternatives)}"
     if all(one.word == DOES_NOT_EXPLAIN for one in verdicts):
         found.append(
             f"{names[closest]} does not explain it: {'; '.join(verdicts[closest].reasons)}"
@@ -203,13 +203,13 @@ def model_verdicts(
     simpler one that does not explain it is as likely.
     """
     behind, error = np.array([one.behind(held_out[0]) for one in held_out]).T
-    clearly_behind = behind > VERDICT.tied_sigmas * error
+    clearly_behind = behind > HELD_OUT_VERDICT.tied_sigmas * error
     passing = [
         entry.model.name
         for k, (entry, one) in enumerate(zip(entries, held_out, strict=True))
         if entry.baseline
         and k in evidence
-        and evidence[k].misfit.usual
+        and evidence[k].discrepancy.usual
         and not held_out_differences(one, motion)
     ]
     found = []
@@ -219,12 +219,12 @@ def model_verdicts(
             entry,
             one,
             motion,
-            misfit=None if asked is None else asked.misfit,
+            discrepancy=None if asked is None else asked.discrepancy,
             bouts=() if asked is None else asked.bouts,
         )
         # Those that the summaries speak for stand beside the first.
-        named = k in (answer.best, *answer.rivals)
-        if asked is not None and not (named or asked.misfit.against or answer.best is None):
+        named = k in (answer.best, *answer.alternatives)
+        if asked is not None and not (named or asked.discrepancy.against or answer.best is None):
             against += [
                 f"{entries[answer.best].model.name} is clearly likelier by the summaries of the "
                 "motion"
@@ -245,7 +245,7 @@ def model_verdicts(
         found.append(verdict_of(against, [] if against else unable))
     if answer.best is not None:
         as_good = answer.as_good(entries, evidence)
-        _doubt_equals(found, entries, answer.best, answer.rivals, as_good)
+        _doubt_equals(found, entries, answer.best, answer.alternatives, as_good)
     return found
 
 
@@ -253,7 +253,7 @@ def _doubt_equals(
     found: list[Verdict],
     entries: Sequence[Candidate],
     best: int,
-    rivals: Sequence[int],
+    alternatives: Sequence[int],
     as_good: Sequence[int],
 ) -> None:
     """Leave open which of several models explains a recording, where they are equally good."""
@@ -263,7 +263,7 @@ def _doubt_equals(
             f"{entries[best].model.name} is simpler and as likely, and does not explain it: the "
             "law may be another one; record for longer"
         )
-        for k in rivals:
+        for k in alternatives:
             if found[k].explains:
                 found[k] = found[k].and_also([], [why])
         return
@@ -281,8 +281,8 @@ def _not_matched(motion: RecordedMotion) -> str:
     if motion.replicates < 2:
         return "the summaries of the motion were not matched: compare with `bootstrap` above 1"
     return (
-        "its summaries of the motion were not matched, but those of "
-        f"{EVIDENCE.most_models} others: compare fewer models"
+        f"its summaries of the motion were not matched, as {EVIDENCE.most_models} other models "
+        "were closer: compare fewer models"
     )
 
 

@@ -25,8 +25,8 @@ def assemble(
         Path | None,
         option(
             "--from RUN",
-            "Fit of glued blocks, or of free ones in one recording: what a hidden face and a "
-            "neighbour feel.",
+            "Fit of glued blocks, or of free blocks in one recording: drag of hidden faces, shared "
+            "stirring.",
             show_default=False,
         ),
     ] = None,

@@ -68,13 +68,14 @@ def plan(
         ),
     ] = None,
     latency: Annotated[
-        float, option("--latency", "From a look until the pumps have changed.", unit="s")
+        float,
+        option("--latency", "Time from an observation until the pumps have changed.", unit="s"),
     ] = 0.0,
     missed: Annotated[
-        float, option("--missed SHARE", "Share of the looks that give no class.")
+        float, option("--missed SHARE", "Share of the observations that give no class.")
     ] = 0.0,
     dwell: Annotated[
-        float, option("--dwell", "Time for which a mode is held at least.", unit="s")
+        float, option("--dwell", "Shortest time for which a mode is held.", unit="s")
     ] = 0.0,
     rounds: Annotated[int, option("--rounds N", "Rounds of planning.", panel=PANEL, min=1)] = 12,
     worlds: Annotated[

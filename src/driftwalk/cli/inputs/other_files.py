@@ -89,7 +89,7 @@ def _maybe_a_field(path: Path) -> str | None:
     try:
         names = ", ".join(list(map(str, open_netcdf(path).variables))[:12])
     except FormatError:
-        return None  # damaged: nobody knows what it was
+        return None  # damaged: it may have been anything
     return (
         f"is NetCDF of no recording that is known, with {names}: if it is a flow field, name its "
         "variables with --flow-variables u=NAME,v=NAME,x=NAME,y=NAME"

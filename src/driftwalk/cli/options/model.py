@@ -167,11 +167,11 @@ def partly_known_model(
     if not known:
         return found
     values = known_values(found.model, found.values)
-    strangers = [one for one in known if one not in values]
-    if strangers:
+    unknown = [one for one in known if one not in values]
+    if unknown:
         raise ConfigurationError(
-            f"--known {strangers[0]}: the model {found.model.name} has {', '.join(values)}"
-            f"{did_you_mean(strangers[0], values)}"
+            f"--known {unknown[0]}: the model {found.model.name} has "
+            f"{', '.join(values)}{did_you_mean(unknown[0], values)}"
         )
     model = found.made_with(name, {one: values[one] for one in known})
     left = {one: value for one, value in values.items() if one not in known}

@@ -96,8 +96,8 @@ class RecordingOptions:
     )
     missing: list[str] | None = _option(
         "--missing X,Y|NUMBER|held",
-        "Position that means that the body was not seen, or held: that of the sample "
-        "before. Repeatable.",
+        "Position that marks a body that was not seen; held: the last position repeated. "
+        "Repeatable.",
     )
     replicate: int | None = _option(
         "--replicate N", "Replicate of a simulation, counted from 0 (default: the first).", min=0

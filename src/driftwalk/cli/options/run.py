@@ -74,9 +74,9 @@ class RunOptions:
                     told["progress"].remark = lambda: cluster.words
                     yield {**told, "executor": cluster.executor}
             finally:
-                befell = cluster.report()
-                if befell:
-                    print_note(befell)
+                report = cluster.report()
+                if report:
+                    print_note(report)
 
 
 with_run_options = with_options(RunOptions)

@@ -154,7 +154,7 @@ def _load(path: Path, how: RecordingOptions, given: StudyOptions) -> tuple[xr.Da
         chosen = int(simulated["run"][0]) if how.replicate is None else how.replicate
         return path_recording(simulated, run=chosen), float(simulated.attrs["block_side_m"]), False
     if given.file is None:
-        # Without a study nobody has said how large the tank is: the blocks need not fit into it.
+        # Without a study the size of the tank is not stated: the blocks need not fit into it.
         stated = given.overrides.get(STUDY_KEYS["side"])
         own = Block().side_m if stated is None else stated
         recording = how.load(path, side=own)
@@ -250,8 +250,8 @@ def _warnings(found: xr.Dataset) -> list[str]:
         )
     if facts["left_out_contacts"]:
         said.append(
-            f"{facts['left_out_contacts']} contacts at rest are left out, as their faces lie "
-            "otherwise than those of joins; a wider --play counts more of them"
+            f"{facts['left_out_contacts']} contacts at rest are left out, because their faces do "
+            "not lie as in a join; a wider --play counts more of them"
         )
     if facts["unknown_samples"]:
         said.append(

@@ -225,7 +225,7 @@ class TrackingRun:
             self._save(complete=self.interrupted is None or self.options.is_camera)
 
     def _keep_what_there_is(self, live: LiveOutputs, source: FrameSource) -> None:
-        """Save what was tracked before an end that nobody wanted."""
+        """Save what was tracked before an unwanted end."""
         live.end(self.interrupted)
         self._source_counts = source.counts.to_dict()
         self._save(complete=False)

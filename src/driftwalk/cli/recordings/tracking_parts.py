@@ -106,7 +106,7 @@ def find_camera(options: TrackingOptions, images: Sequence[Any]) -> Camera:
 
 
 def _centred(camera: Camera, still: Any, options: TrackingOptions) -> Camera:
-    """Return a camera with a scale of its own, its origin moved to the middle of the tank."""
+    """Return a camera with its own scale, its origin moved to the middle of the tank."""
     from driftwalk.track import centre_on_rim
 
     stated = options.tank
@@ -116,7 +116,7 @@ def _centred(camera: Camera, still: Any, options: TrackingOptions) -> Camera:
     except InputError as error:
         raise InputError(
             f"{options.camera} has a scale, and the tank's centre is not found: {error}; or leave "
-            "--tank out: then the origin is that of the camera file"
+            "--tank out: then the origin is the camera file's"
         ) from error
     if abs(found / stated - 1) > _RIM_OFF:
         print_note(

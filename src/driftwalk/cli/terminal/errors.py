@@ -132,7 +132,7 @@ def _joined(text: str) -> str:
 
 
 def _silence_stdout() -> None:
-    """Keep the interpreter from complaining when it flushes a pipe that nobody reads."""
+    """Keep the interpreter from complaining when it flushes a closed pipe."""
     with contextlib.suppress(OSError), open(os.devnull, "w", encoding="utf-8") as nowhere:  # noqa: PTH123
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 

@@ -86,7 +86,7 @@ class ProgressReporter:
 
     @property
     def left(self) -> str:
-        """The time left in words; empty where nobody knows, or nothing is left."""
+        """The time left in words; empty where it is unknown, or nothing is left."""
         from driftwalk.schema.answers.parts import duration_text
 
         return f"{duration_text(self.left_s)} left" if self.left_s else ""

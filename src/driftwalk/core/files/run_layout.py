@@ -150,7 +150,7 @@ def _fault(folder: Path, name: str, listed: Mapping[str, Any] | None) -> str | N
         return f"{shown} {error.reason}"
     except (InputError, OSError) as error:
         return f"{shown} cannot be read: {getattr(error, 'strerror', None) or error}"
-    return f"{shown} is not the file that the run wrote: its hash is not that of the manifest"
+    return f"{shown} was changed after the run wrote it: its hash differs from the manifest's"
 
 
 def _is_there(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""The run directory: results of one piece of work, safe against kills, repeats and rivals.
+"""The run directory: results of one piece of work, safe against kills, repeats and concurrent runs.
 
 While a run is under way its folder holds ``.run.json`` (what determines the numbers) and
 ``.shards/`` (finished work units). A finished run holds its results and ``manifest.json``, which is
@@ -131,7 +131,7 @@ class RunDirectory:
         refuse_leading_out(self.path)
         self._lock = lock_folder(self.path)
         try:
-            # Again: only under the lock does nobody change what is looked at.
+            # Again: only under the lock does nothing change what is looked at.
             refuse_foreign(self.path)
             self._take_over()
         except BaseException:

@@ -186,7 +186,7 @@ def frame_numbers(recording: xr.Dataset) -> Integers:
 
 
 def _is_even(time: Floats, rate: float) -> bool:
-    """Whether every time lies at a frame of its own."""
+    """Whether every time lies at a different frame."""
     if not (np.isfinite(rate) and rate > 0.0):
         return False
     ticks = (time - time[0]) * rate

@@ -54,7 +54,7 @@ def lost(format: str, motion: Motion) -> list[str]:
     []
     """
     recording = motion.recording
-    found = _of_samples(format, recording)
+    found = _lost_in_samples(format, recording)
     if format not in WHOLE:
         tank = tank_text(recording)
         if tank:
@@ -63,9 +63,9 @@ def lost(format: str, motion: Motion) -> list[str]:
             began = float(recording.attrs["time_origin_unix_s"])
             found.append(f"when the recording began, {began:.6f} s after 1970")
     if format == "trackpy":
-        found += _of_particles(recording)
+        found += _lost_in_trackpy(recording)
     if format == "ros":
-        found += _of_bag(recording)
+        found += _lost_in_bag(recording)
     further = [name for name in recording.data_vars if name not in POSE]
     if further:
         found.append(f"further numbers of each sample: {', '.join(map(str, further))}")
@@ -163,7 +163,7 @@ def write_tank(motion: Motion, folder: Path) -> list[Path]:
     return [target]
 
 
-def _of_samples(format: str, recording: xr.Dataset) -> list[str]:
+def _lost_in_samples(format: str, recording: xr.Dataset) -> list[str]:
     """Return which samples a table or a bag of those that are there leaves out."""
     if format in WHOLE:
         return []
@@ -185,7 +185,7 @@ def _of_samples(format: str, recording: xr.Dataset) -> list[str]:
     return found
 
 
-def _of_particles(recording: xr.Dataset) -> list[str]:
+def _lost_in_trackpy(recording: xr.Dataset) -> list[str]:
     names, numbers = body_names(recording), particle_numbers(recording).tolist()
     renamed = [
         f"{number} is {name}"
@@ -198,7 +198,7 @@ def _of_particles(recording: xr.Dataset) -> list[str]:
     return found
 
 
-def _of_bag(recording: xr.Dataset) -> list[str]:
+def _lost_in_bag(recording: xr.Dataset) -> list[str]:
     found = ["digits of the time below a nanosecond"]
     names = dict(zip(topics(recording), body_names(recording), strict=True))
     renamed = [f"{topic} is {name}" for topic, name in names.items() if topic != f"/{name}"]

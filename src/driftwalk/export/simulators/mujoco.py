@@ -132,7 +132,7 @@ def require() -> None:
 
 
 def verify(folder: Path) -> Verification:
-    """Run ``verify.py`` of an export in a process of its own; see `Target.verify`."""
+    """Run ``verify.py`` of an export in a separate process; see `Target.verify`."""
     done = subprocess.run(
         [sys.executable, "-B", "-c", "import json, verify; print(json.dumps(verify.prove()))"],
         cwd=folder,

@@ -71,7 +71,7 @@ class Column(NamedTuple):
 
     @property
     def exact(self) -> bool:
-        """Whether the name is that of the quantity."""
+        """Whether the name belongs to the quantity."""
         return self.base == self.quantity
 
     @property
@@ -126,7 +126,7 @@ def _quantity(words: Sequence[str]) -> str:
 
 
 def holds_field(names: Sequence[str]) -> bool:
-    """Return whether the names of columns are those of a velocity field."""
+    """Return whether the names of columns belong to a velocity field."""
     return set(FIELD) <= {column_of(name).quantity for name in names}
 
 
@@ -168,8 +168,8 @@ def choose_columns(names: Sequence[str], stated: Mapping[str, str]) -> dict[str,
     units = [found[wanted][1] for wanted in FIELD]
     if units[0] != units[1] or units[2] != units[3]:
         raise InputError(
-            f"x, y, u, v have the units {', '.join(unit or 'none' for unit in units)}: name those "
-            "of x and y alike, and those of u and v"
+            f"x, y, u, v have the units {', '.join(unit or 'none' for unit in units)}: use one "
+            "unit for x and y, and one for u and v"
         )
     return found
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class VerdictPolicy(NamedTuple):
+class ModelCheckPolicy(NamedTuple):
     """When the model does not explain a recording."""
 
     level: float = 0.0005
@@ -34,7 +34,7 @@ class VerdictPolicy(NamedTuple):
     """Share of samples beyond 6 standard deviations. One in 5e8 is expected, but a tracker may slip
     now and then. Chosen by hand."""
     missed_outliers: float = 0.25
-    """Mistakes of a tracker that show in the innovations alone, over those that their neighbours
+    """Outliers that show in the innovations alone, over those that their neighbours
     show. Measured: 9 to 14 % where positions were 5 mm off."""
     drag_change: float = 0.05
     """Change of C_d with speed that the fit itself brings about. Measured: in ten minutes of the
@@ -46,7 +46,7 @@ class VerdictPolicy(NamedTuple):
     did with 200 samples, none of 5 with 300."""
 
 
-VERDICT: Final = VerdictPolicy()
+MODEL_CHECK: Final = ModelCheckPolicy()
 
 
 class LargestPolicy(NamedTuple):
@@ -67,7 +67,7 @@ class LeastPolicy(NamedTuple):
     """Misfits up to which the model serves, however surely they are there."""
 
     ks_distance: float = 0.1
-    """KS distance of the steps from those of drawn replicates. Fits of the model itself, with C_d
+    """KS distance of the steps from drawn replicates. Fits of the model itself, with C_d
     within 5 %, had up to 0.08, in an orbit smaller than the block (development set of
     studies/verdict)."""
     strength: float = 0.02
@@ -136,12 +136,12 @@ class Criterion(NamedTuple):
     @property
     def failed(self) -> bool:
         """Whether this criterion says that the model does not explain the recording."""
-        return self.p_value < VERDICT.level and self.size > self.least
+        return self.p_value < MODEL_CHECK.level and self.size > self.least
 
     @property
     def note(self) -> str | None:
         """The finding where it is sure, but too small to change the verdict."""
-        if self.failed or not self.p_value < VERDICT.level:
+        if self.failed or not self.p_value < MODEL_CHECK.level:
             return None
         sizes = self.measure.format(self.size, self.least).replace("%", " %")
         return f"too small to change the verdict: {sizes} is tolerated; {self.sentence}"
@@ -166,7 +166,7 @@ def criteria_of(
     return [
         autocorrelation_criterion(found.white, names),
         tail_criterion(found.white, names),
-        outlier_criterion(errors, int(fit["mistakes"])),
+        outlier_criterion(errors, int(fit["outliers"])),
         place_criterion(found.place, layout),
         time_and_place_criterion(found.part, layout),
         strength_criterion(found.strength, layout),
@@ -192,7 +192,7 @@ def autocorrelation_criterion(white: WhitenessTests, components: tuple[str, ...]
         f"of {components[component]} at lag {lag} is {value:+.3f}, expected {expected:+.3f} ± "
         f"{std:.3f}: the force has a memory, the flow changes faster than the model lets it, or "
         "neighbouring samples share their errors (a compressed video, a smoothed track)",
-        math.sqrt(detectable_noncentrality(dof, VERDICT.level)) * float(np.median(white.std))
+        math.sqrt(detectable_noncentrality(dof, MODEL_CHECK.level)) * float(np.median(white.std))
         if dof
         else math.nan,
     )
@@ -211,28 +211,28 @@ def tail_criterion(white: WhitenessTests, components: tuple[str, ...]) -> Criter
         f"{white.excess_kurtosis[worst]:+.2f}, expected 0 ± {white.kurtosis_std[worst]:.2f} "
         f"({in_percent(white.tail_share[worst], decimals=2)} beyond 3 sd, expected 0.27 %): the "
         "force comes in bursts, or the tracker slips",
-        detectable_sigmas(0.5 * VERDICT.level / len(components)) * white.kurtosis_std[worst],
+        detectable_sigmas(0.5 * MODEL_CHECK.level / len(components)) * white.kurtosis_std[worst],
         size=abs(float(white.excess_kurtosis[worst])),
         least=LEAST.kurtosis,
         measure="the excess kurtosis is {:.2f}, up to {:.1f}",
     )
 
 
-def outlier_criterion(errors: Sequence[Innovations], mistakes: int) -> Criterion:
+def outlier_criterion(errors: Sequence[Innovations], left_out: int) -> Criterion:
     """Ask whether samples were left out because they are far from every prediction.
 
-    `mistakes` of the tracker were left out before, as far from both of their neighbours.
+    `left_out` samples were outliers before: far from both of their neighbours.
     """
     from scipy.stats import norm
 
-    expected = round(VERDICT.missed_outliers * mistakes)
+    expected = round(MODEL_CHECK.missed_outliers * left_out)
     outliers = sum(int(one.outlier.sum()) for one in errors)
     samples = sum(one.used.size for one in errors)
     share = outliers / max(samples, 1)
-    least = max(VERDICT.most_outliers * samples, expected) + 1.0
+    least = max(MODEL_CHECK.most_outliers * samples, expected) + 1.0
     return Criterion(
         "outliers",
-        0.0 if share > VERDICT.most_outliers and outliers > expected else 1.0,
+        0.0 if share > MODEL_CHECK.most_outliers and outliers > expected else 1.0,
         f"{outliers} of {samples} samples ({in_percent(share, decimals=2)}) are further than 6 sd "
         f"from where they were predicted and were left out, expected {expected or 'none'}: jumps "
         "of the tracker, contacts, or bursts",
@@ -260,10 +260,10 @@ def place_criterion(local: LocalMeans, layout: Layout) -> Criterion:
         f"({local.samples[worst]:.0f} samples), expected below {limit:.1f} in all "
         f"{cells.size} cells in 95 % of recordings: the fitted flow is wrong there",
         math.sqrt(
-            detectable_noncentrality(dof, VERDICT.level / cells.size)
+            detectable_noncentrality(dof, MODEL_CHECK.level / cells.size)
             / float(np.median(local.samples[cells]))
         ),
-        **_local_size(local, local.chi_squared > chi2.isf(VERDICT.level / cells.size, dof)),
+        **_local_size(local, local.chi_squared > chi2.isf(MODEL_CHECK.level / cells.size, dof)),
     )
 
 
@@ -297,7 +297,7 @@ def time_and_place_criterion(local: LocalMeans, layout: Layout) -> Criterion:
     ratio = total / np.maximum(degrees, 1)
     worst = int(p_values.argmin() if p_values.min() > 0 else ratio.argmax())
     cell = int(np.nanargmax(table[worst])) if degrees[worst] else 0
-    failed = (p_values * np.count_nonzero(degrees) < VERDICT.level)[:, None]
+    failed = (p_values * np.count_nonzero(degrees) < MODEL_CHECK.level)[:, None]
     return Criterion(
         "time and place",
         min(1.0, np.count_nonzero(degrees) * float(p_values[worst])),
@@ -315,7 +315,7 @@ def _detectable_in_part(local: LocalMeans, layout: Layout, degrees: Integers) ->
     known = np.flatnonzero(degrees)
     samples = local.samples.reshape(layout.parts, -1).sum(axis=1)[known]
     usual = float(np.median(degrees[known]))
-    shift = detectable_noncentrality(usual, VERDICT.level / known.size)
+    shift = detectable_noncentrality(usual, MODEL_CHECK.level / known.size)
     return math.sqrt(shift / float(np.median(samples)))
 
 
@@ -335,7 +335,7 @@ def strength_criterion(trend: Trend, layout: Layout) -> Criterion:
         f"{in_percent(trend.std[worst], decimals=1)} "
         f"(chi squared {trend.chi_squared:.0f}, expected {trend.dof} ± "
         f"{math.sqrt(2 * trend.dof):.0f})",
-        math.sqrt(detectable_noncentrality(trend.dof, VERDICT.level))
+        math.sqrt(detectable_noncentrality(trend.dof, MODEL_CHECK.level))
         * float(np.median(trend.std[known])),
         LARGEST.strength,
         float(np.abs(trend.change[known]).max()),
@@ -350,17 +350,17 @@ def drag_criterion(trend: Trend, edges: Floats) -> Criterion:
 
     if trend.dof == 0:
         return Criterion("drag law", math.nan, "")
-    std = np.hypot(trend.std, VERDICT.drag_change)
+    std = np.hypot(trend.std, MODEL_CHECK.drag_change)
     off = np.abs(trend.change) / std
     worst = int(off.argmax())
     return Criterion(
         "drag law",
         min(1.0, 2.0 * off.size * float(norm.sf(off[worst]))),
-        f"one C_d does not serve at all speeds: at {edges[worst]:.3g} to {edges[worst + 1]:.3g} "
-        f"m/s past the block it would be {in_percent(trend.change[worst], sign=True)} off, "
-        f"expected 0 ± {in_percent(std[worst])}: the drag is not the square law, or not that of a "
+        f"one C_d does not fit all speeds: at {edges[worst]:.3g} to {edges[worst + 1]:.3g} m/s "
+        f"past the block it would be {in_percent(trend.change[worst], sign=True)} off, expected 0 "
+        f"± {in_percent(std[worst])}: the drag is not quadratic, or the body is not the stated "
         "block",
-        detectable_sigmas(0.5 * VERDICT.level / off.size) * float(np.median(std)),
+        detectable_sigmas(0.5 * MODEL_CHECK.level / off.size) * float(np.median(std)),
         LARGEST.drag,
     )
 
@@ -385,7 +385,8 @@ def noise_criterion(spread: Spread, layout: Layout, *, by: str) -> Criterion:
         min(1.0, known.size * float(p_values.min())),
         f"the noise is not the same everywhere: {at} the mean square of the errors of prediction "
         f"is {spread.ratio[worst]:.2f} of the overall one, expected 1 ± {spread.std[worst]:.2f}",
-        detectable_sigmas(0.5 * VERDICT.level / known.size) * float(np.median(spread.std[known])),
+        detectable_sigmas(0.5 * MODEL_CHECK.level / known.size)
+        * float(np.median(spread.std[known])),
     )
 
 
@@ -406,7 +407,7 @@ def motion_criterion(motion: MotionComparison | None, *, angle: str) -> Criterio
         f"{motion.drawn_distance.mean():.3f} to "
         f"those with parameters that the fit allows, expected {between:.3f} ± "
         f"{motion.drawn_between.std(ddof=1):.3f}, the distance among them{averaged}",
-        motion.detectable(VERDICT.level),
+        motion.detectable(MODEL_CHECK.level),
         LARGEST.ks_distance if motion.far else math.inf,
         float(motion.drawn_distance.mean()),
         LEAST.ks_distance,

@@ -103,7 +103,7 @@ class EstimateDistances(NamedTuple):
 
 
 def distances_at_estimate(real: Floats, found: Replicates, *, threads: int) -> EstimateDistances:
-    """Compare a recording's steps with those of replicates at the estimate."""
+    """Compare a recording's steps with replicates at the estimate."""
     _require_replicates(found)
     half = len(found.steps) // 2
     floor = _distances(found.steps[:half], found.steps[half:], threads)

@@ -240,14 +240,14 @@ def posterior_replicates(
     points, factors = _posterior_samples(fit, estimate, spread, count, seed)
     drag = fitted_value(fit, "drag_coefficient") * factors[:, 0]
     force = fitted_value(fit, "force_std") * factors[:, 1]
-    parts: list[list[_World]] = []
+    parts: list[list[_Replicate]] = []
     for index, one in enumerate(series):
         keys = _keys(seed, CheckStream.DRAWN, index, one, count)
         filtered = estimate.passes.series[index]
 
         def simulated(
             k: int, one: Replicated = one, keys: Keys = keys, filtered: Series = filtered
-        ) -> list[_World]:
+        ) -> list[_Replicate]:
             like = one.problem.like
             assert like.flow is not None
             x, y = like.flow["x"].values, like.flow["y"].values
@@ -311,14 +311,14 @@ def _force_factor(point: Point, series: Series) -> float:
     return math.exp(0.5 * point.intensity_contrasts.get(series.flow, 0.0))
 
 
-class _World(NamedTuple):
+class _Replicate(NamedTuple):
     steps: Floats
     path: Path | None
     sound: bool
 
 
 def _keys(seed: int, kind: int, index: int, one: Replicated, count: int) -> Keys:
-    """Return the keys of a series' worlds, (replicates, sections)."""
+    """Return the keys of a series' sections, (replicates, sections)."""
     number = np.arange(count * one.first.size)
     return world_keys(seed, trial=2 * index + kind, replicate=number).reshape(count, -1)
 
@@ -332,23 +332,23 @@ def _simulated(
     begin: float = 0.0,
     *,
     with_path: bool = False,
-) -> list[_World]:
+) -> list[_Replicate]:
     time = one.problem.like.sample_time
     poses, sound = _poses(one, keys, drag, force)
     # Without the last sample of a section no velocity is taken across a restart.
     shown = np.delete(np.arange(time.size), np.append(one.first[1:] - 1, time.size - 1))
     at = begin + time[shown]
-    worlds = []
+    replicates = []
     for k, key in enumerate(keys[:, 0]):
         x, y, theta = poses[:, k].astype(np.float64)
         x, y = _as_seen(x, y, theta, time=time, point=point, key=int(key))
         if with_path:
             path = (at, x[shown].astype(np.float32), y[shown].astype(np.float32))
-            worlds.append(_World(np.zeros((0, 2)), path, bool(sound[k])))
+            replicates.append(_Replicate(np.zeros((0, 2)), path, bool(sound[k])))
             continue
         steps = one.steps(x, y, theta)
-        worlds.append(_World(steps, None, bool(sound[k] and len(steps) > 0)))
-    return worlds
+        replicates.append(_Replicate(steps, None, bool(sound[k] and len(steps) > 0)))
+    return replicates
 
 
 def _poses(
@@ -396,7 +396,7 @@ def _as_seen(
     return x, y
 
 
-def _joined(parts: Sequence[Sequence[_World]]) -> Replicates:
+def _joined(parts: Sequence[Sequence[_Replicate]]) -> Replicates:
     """Put the recordings of each replicate together."""
     whole = list(zip(*parts, strict=True))
     retained = [one for one in whole if all(world.sound for world in one)]

@@ -10,7 +10,12 @@ import numpy as np
 from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.likelihood.angle_consistency import log_evidence, negated
-from driftwalk.likelihood.check.criteria import VERDICT, components_of, criteria_of, distance_limit
+from driftwalk.likelihood.check.criteria import (
+    MODEL_CHECK,
+    components_of,
+    criteria_of,
+    distance_limit,
+)
 from driftwalk.likelihood.check.errors import Innovations, innovations_of
 from driftwalk.likelihood.check.measured import left_out_sentence
 from driftwalk.likelihood.check.place import Residuals, residuals_of
@@ -41,7 +46,7 @@ from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.warnings import against_water, is_against_water
 from driftwalk.schema.answers.facts import facts_of, fitted_value, sentences, texts
 from driftwalk.schema.answers.fit import with_verdict
-from driftwalk.schema.answers.force_law import SELECTION
+from driftwalk.schema.answers.force_law import FORWARD_SELECTION
 from driftwalk.schema.answers.verdict import (
     DOES_NOT_EXPLAIN,
     EXPLAINS,
@@ -227,7 +232,7 @@ def check_model(
         "cell_size_m": found.layout.size,
         "replicates": replicates,
         "seed": seed,
-        "level": VERDICT.level,
+        "level": MODEL_CHECK.level,
         "arena": fit.attrs["arena"],
         "source": fit.attrs["source"],
         "simulated_recording": fit.attrs["simulated_recording"],
@@ -258,7 +263,7 @@ def check_model(
             with_path=True,
         )
         paths = [(one.time, one.x, one.y) for one in seen.passes.series]
-        scan = scan_of(paths, free.paths, found.layout, level=VERDICT.level)
+        scan = scan_of(paths, free.paths, found.layout, level=MODEL_CHECK.level)
         parts.append(motion_variables(motion))
         attrs |= motion_facts(motion)
     except InputError as error:
@@ -290,11 +295,11 @@ def check_model(
 def _require_used(errors: Sequence[Innovations]) -> None:
     """Refuse a check of so few errors that the tests of them mean nothing."""
     used = sum(int(one.used.sum()) for one in errors)
-    if used < VERDICT.fewest_used:
+    if used < MODEL_CHECK.fewest_used:
         intervals = sum(one.used.size - 1 for one in errors)
         raise InputError(
             f"the model cannot be checked: the fit used {used} of {intervals} intervals between "
-            f"samples, and the check needs {VERDICT.fewest_used} at least"
+            f"samples, and the check needs {MODEL_CHECK.fewest_used} at least"
         )
 
 
@@ -367,15 +372,17 @@ def _with_angle_tried(
     other = negated(recordings)
     try:
         study = parse_study(fit.attrs["study"])
-        rival = fit_motion(other, study, angle=fit.attrs["angle"], body=body, flow=stored_flow(fit))
+        alternative = fit_motion(
+            other, study, angle=fit.attrs["angle"], body=body, flow=stored_flow(fit)
+        )
         before, after = (
             log_evidence(estimate_of(one, many, body=body))
-            for one, many in ((fit, recordings), (rival, other))
+            for one, many in ((fit, recordings), (alternative, other))
         )
         gain = after - before
         helps = (
-            gain > SELECTION.least_evidence
-            and check_model(rival, other, body=body)["verdict"] == EXPLAINS
+            gain > FORWARD_SELECTION.least_evidence
+            and check_model(alternative, other, body=body)["verdict"] == EXPLAINS
         )
     except (InputError, *BREAKDOWN):
         helps = False
@@ -383,7 +390,7 @@ def _with_angle_tried(
     if helps:
         said = (
             f"{seen}: with the angle negated the model explains the recording, C_d is "
-            f"{fitted_value(rival, 'drag_coefficient'):.3g}, and the likelihood is higher by "
+            f"{fitted_value(alternative, 'drag_coefficient'):.3g}, and the likelihood is higher by "
             f"e^{gain:.0f}: negate the angle, or turn y upwards"
         )
         found = stored_verdict(check)

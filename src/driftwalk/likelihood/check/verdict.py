@@ -100,7 +100,7 @@ def _without_power(criteria: Sequence[Criterion], drag_std: float) -> Iterator[s
                 "longer, or over more of the tank"
             )
         if one.name == "steps" and isnan(one.p_value):
-            yield "the steps could not be compared with those of simulated recordings"
+            yield "the steps could not be compared with simulated recordings"
 
 
 def _too_little_seen(fit: xr.Dataset, *, side_m: float) -> Iterator[str]:
@@ -119,7 +119,7 @@ def _too_little_seen(fit: xr.Dataset, *, side_m: float) -> Iterator[str]:
 
 
 def _too_often_at_wall(share: float, drag_std: float) -> Iterator[str]:
-    """Say where C_d is not known well enough for so many contacts."""
+    """Say where C_d is not known well enough for the number of contacts."""
     often = INFORMATION.wall_share_in_doubt < share <= INFORMATION.most_wall_share
     if often and INFORMATION.most_drag_std_at_wall < drag_std < inf:
         yield (

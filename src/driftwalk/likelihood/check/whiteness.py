@@ -22,9 +22,9 @@ class ClusterPolicy(NamedTuple):
     """Length of a cluster [s]: longer than a block takes to pass a place where the flow is not
     known. Chosen by hand."""
     least_ratio: float = 1.3
-    """A cluster-robust standard error over that of independent errors from which it counts. With 60
-    clusters chance exceeds it at one lag in 1600 and for one kurtosis in 29, with 18 in 28 and in
-    12: in short recordings the criteria are a little milder."""
+    """Cluster-robust standard error, over the one of independent errors, from which it counts. With
+    60 clusters chance exceeds it at one lag in 1600 and for one kurtosis in 29, with 18 in 28 and
+    in 12: in short recordings the criteria are a little milder."""
 
 
 CLUSTER: Final = ClusterPolicy()

@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.conditions import estimated_study
 from driftwalk.core.arrays import Floats
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.likelihood.contacts.particles import (
     Part,
     Passages,
@@ -167,7 +167,7 @@ _CURVATURES: Final = (
 """Derivatives of the curvature by the parabola's last three numbers."""
 
 
-class ContactPolicy(NamedTuple):
+class WallContactPolicy(NamedTuple):
     """How many contacts an estimate of the wall takes."""
 
     fewest: int = 8
@@ -176,7 +176,7 @@ class ContactPolicy(NamedTuple):
     """More are thinned to this many, evenly. Chosen by hand, for the time that they take."""
 
 
-CONTACT: Final = ContactPolicy()
+WALL_CONTACT: Final = WallContactPolicy()
 
 
 def estimate_wall(
@@ -212,7 +212,7 @@ def estimate_wall(
     Raises
     ------
     InputError
-        When the recordings are not those of the fit.
+        When the recordings do not belong to the fit.
 
     Examples
     --------
@@ -257,20 +257,20 @@ def estimate_wall(
         found = [passages_of(estimate, one) for one in estimate.passes.series]
         count = sum(len(one.x) for one in found)
         fit = described(fit.assign(wall_contacts=((), np.int64(count))))
-        if count < CONTACT.fewest:
+        if count < WALL_CONTACT.fewest:
             return left_out(
-                f"the estimate of the wall needs {CONTACT.fewest} contacts with it, and {count} "
-                "can be followed: record for longer, at an even rate, or where the flow drives "
-                "the block to the wall"
+                f"the estimate of the wall needs {WALL_CONTACT.fewest} contacts with it, and "
+                f"{count} can be followed: record for longer, at an even rate, or where the flow "
+                "drives the block to the wall"
             )
-        data = _answer(fit, estimate, found, seed=seed, tell=tell or tell_nobody)
+        data = _answer(fit, estimate, found, seed=seed, tell=tell or ignore_progress)
     except BREAKDOWN as error:
         return left_out(f"the estimate of the wall failed: {error}")
     if is_undetermined(data):
         return left_out(
-            f"the block passed along the wall {count} times, which does not tell one wall from "
-            "another: the block hardly touched it, or moved as none would make it move; check the "
-            "size of the tank (`tank`) and the side of the block (`side`)"
+            f"the block passed along the wall {count} times, which does not determine the wall: "
+            "the block hardly touched it, or no wall explains how it moved; check the size of the "
+            "tank (`tank`) and the side of the block (`side`)"
         )
     return described(fit.assign(data))
 
@@ -283,7 +283,7 @@ def _answer(
     intervals = fitted_intervals(fit)
     parts = [
         Part(
-            thinned(passages, min(1.0, CONTACT.most / count)),
+            thinned(passages, min(1.0, WALL_CONTACT.most / count)),
             fitted_flow(fit, interval=intervals.of_flow(series.flow)[0]),
             float(np.median(np.diff(series.time))),
         )

@@ -95,7 +95,7 @@ def glued_study(study: Study, earlier: xr.Dataset) -> Study:
     one = parse_study(earlier.attrs["study"])
     if cells < 2 or len(one.block.body().cells) > 1:
         raise InputError(
-            "an earlier fit of one block is the start of a fit of glued blocks "
+            "an earlier fit of one block is used only in a fit of glued blocks "
             f"({argument_text('block.shape', 'xx')}); to fit several recordings of one block "
             "together: driftwalk fit FIRST SECOND"
         )

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Floats
-from driftwalk.core.progress import Course
+from driftwalk.core.progress import StagedProgress
 from driftwalk.core.units import in_percent
 from driftwalk.likelihood.filter.difference_pairs import unpacked
 from driftwalk.likelihood.filter.filter_pass import Passes
@@ -206,7 +206,9 @@ def _block_diagonal(blocks: Floats) -> Floats:
     return whole.reshape(count * size, count * size)
 
 
-def shared_stirring(ready: PreparedRecordings, point: Point, course: Course) -> SharedStirring:
+def shared_stirring(
+    ready: PreparedRecordings, point: Point, staged: StagedProgress
+) -> SharedStirring:
     """Return the length over which the bodies of a recording share the stirring.
 
     Nothing where the study does not ask for it.
@@ -217,12 +219,12 @@ def shared_stirring(ready: PreparedRecordings, point: Point, course: Course) -> 
         One recording for each body.
     point : Point
         The fit of all of them.
-    course : Course
+    staged : StagedProgress
         The progress of the fit.
     """
     if not ready.study.fit.interaction:
         return SharedStirring()
-    course.begin("shared stirring")
+    staged.begin("shared stirring")
     from scipy.interpolate import CubicSpline
     from scipy.stats import norm
 

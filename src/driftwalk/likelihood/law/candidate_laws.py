@@ -41,7 +41,7 @@ of half a period, of one and so on. Cosines alone hold 0.93 of a straight line."
 CHANGES: Final = ("strength_trend", *STRENGTHS[1::2])
 """Those whose shapes go from 1 to -1 between the first sample and the last."""
 DRAG_SHAPES: Final = ("linear_share", "drag_power")
-"""How the drag may go with the speed otherwise: one of them at most is opened."""
+"""Other ways in which the drag may depend on the speed: one of them at most is opened."""
 OF_PREDICTIONS: Final = ("hidden_share",)
 """Numbers that the predictions alone determine, as they do C_d: what the covariances say of a drag
 is wrong to the order in which the filter is. Of a dimer that was slow in the water they said 1

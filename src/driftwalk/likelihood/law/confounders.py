@@ -1,6 +1,6 @@
-"""Confounders of an opened law: what else feigns a power of the drag or a memory of the force.
+"""Confounders of an opened law: what else looks like a power of the drag or a memory of the force.
 
-Contacts with the wall that the filter takes for free motion, mistakes of the tracker and a flow
+Contacts with the wall that the filter takes for free motion, tracking errors and a flow
 whose shape changes leave errors that another law absorbs. Such a law is opened only where the
 recording asks for it without them, too.
 """
@@ -63,7 +63,7 @@ class Confounders:
         """Return for each number of the law that a confounder explains why, in a sentence."""
         shape = self.shape_change(mode)
         if shape is not None and shape.significant:
-            why = "the shape of the flow changes, which feigns such a law"
+            why = "the shape of the flow changes, which can look like such a law"
             return {name: f"{number_sentence(mode, name)} was not opened: {why}" for name in names}
         series, usable = self.undisturbed(), usable_intervals(self.search.passes.series)
         share = usable_intervals(series) / max(usable, 1)
@@ -73,8 +73,8 @@ class Confounders:
         return {
             name: (
                 f"{number_sentence(mode, name)} was not opened: "
-                f"{self._without(alone, name, share)}; contacts with the wall or mistakes of the "
-                "tracker feign such a law: record where the block stays away from the wall"
+                f"{self._without(alone, name, share)}; contacts with the wall or tracking errors "
+                "can look like such a law: record where the block stays away from the wall"
             )
             for name in names
             if alone is None or not alone.converged or not self._same(mode, alone, name)

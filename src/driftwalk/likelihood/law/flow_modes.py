@@ -26,7 +26,7 @@ from driftwalk.likelihood.law.shape_changes import ShapeChange, find_shape_chang
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, thinned
 from driftwalk.likelihood.preparation import Estimate, PreparedRecordings
 from driftwalk.likelihood.prior import Prior, Weights
-from driftwalk.schema.answers.force_law import SELECTION
+from driftwalk.schema.answers.force_law import FORWARD_SELECTION
 
 Wanted = Literal["none", "auto", "1", "2"]
 
@@ -66,7 +66,7 @@ class FlowModes(NamedTuple):
     opened: Mapping[str, float] = {}
     """Numbers of the modes, with their first values."""
     unsettled: str = ""
-    """Why modes were looked for in vain, in a sentence."""
+    """Why no modes were found, in a sentence."""
 
 
 def require_one_flow(ready: PreparedRecordings, before: Estimate | None = None) -> None:
@@ -140,7 +140,7 @@ def modes_at(
         for number, mode in found.items()
     }
     ahead = max(evidence.values()) - evidence_of(steady, search.prior)
-    if wanted == "auto" and ahead < SELECTION.least_evidence:
+    if wanted == "auto" and ahead < FORWARD_SELECTION.least_evidence:
         return FlowModes(unsettled=f"{NO_EVIDENCE}; {NEEDED}")
     number = _number_of(evidence) if wanted == "auto" else int(wanted)
     if number not in found:
@@ -162,7 +162,7 @@ def _best_of(search: ModeSearch, steady: Mode, candidates: Sequence[float]) -> f
 
 def _number_of(evidence: Mapping[int, float]) -> int:
     """Return the number of modes: the smaller one where the evidence does not settle it."""
-    if 1 in evidence and evidence[2] - evidence[1] < SELECTION.least_evidence:
+    if 1 in evidence and evidence[2] - evidence[1] < FORWARD_SELECTION.least_evidence:
         return 1
     return 2
 

@@ -236,7 +236,7 @@ def effective_logs(fit: xr.Dataset, study: Study) -> tuple[float, float]:
     intensity = force**2 * float(fit["force_interval"]) / study.block.mass_kg**2
     drag = float(fit["filter_drag_coefficient"])
     if not (drag > 0.0 and intensity > 0.0):
-        raise InputError("the fit does not determine C_d and σ_F: nothing can stand on it")
+        raise InputError("the fit does not determine C_d and σ_F, which this step needs")
     return math.log(drag), math.log(intensity)
 
 

@@ -24,7 +24,7 @@ from driftwalk.likelihood.law.score_tests import (
 )
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch
 from driftwalk.likelihood.prior import Weights
-from driftwalk.schema.answers.force_law import SELECTION
+from driftwalk.schema.answers.force_law import FORWARD_SELECTION
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,24 +47,24 @@ class LawResult:
     """Further searches that broke down, in words."""
     unsettled: tuple[str, ...] = ()
     """Reasons why a number of the law was not opened, or why another law may be right."""
-    rivals: tuple[Mode, ...] = ()
+    alternatives: tuple[Mode, ...] = ()
     """Modes of the laws that may be right as well."""
     noted: tuple[str, ...] = ()
-    """Laws among the rivals that leave the verdict alone, in sentences."""
+    """Laws among the alternatives that leave the verdict alone, in sentences."""
 
 
 def least_effects(side: float) -> dict[str, float]:
     """Return the least effect of each number, for a block's side [m]: below it none is opened."""
     return {
-        "linear_share": SELECTION.linear_share,
-        "drag_power": SELECTION.drag_power,
-        "force_memory": SELECTION.force_memory,
-        "time_variance": SELECTION.time_noise**2,
-        "angle_offset": math.radians(SELECTION.angle_offset_deg),
-        "marker_x": SELECTION.marker * side,
-        "marker_y": SELECTION.marker * side,
-        **dict.fromkeys(STRENGTHS, SELECTION.strength),
-        **dict.fromkeys(PULSES, SELECTION.pulse),
+        "linear_share": FORWARD_SELECTION.linear_share,
+        "drag_power": FORWARD_SELECTION.drag_power,
+        "force_memory": FORWARD_SELECTION.force_memory,
+        "time_variance": FORWARD_SELECTION.time_noise**2,
+        "angle_offset": math.radians(FORWARD_SELECTION.angle_offset_deg),
+        "marker_x": FORWARD_SELECTION.marker * side,
+        "marker_y": FORWARD_SELECTION.marker * side,
+        **dict.fromkeys(STRENGTHS, FORWARD_SELECTION.strength),
+        **dict.fromkeys(PULSES, FORWARD_SELECTION.pulse),
     }
 
 
@@ -73,7 +73,9 @@ def is_retained(mode: Mode, name: str, least: Mapping[str, float]) -> bool:
     value, std = mode.value_of(name)
     error = math.hypot(std, 0.5 * least.get(name, 0.0))
     memory = name == "force_memory"
-    sigmas = SELECTION.retained_memory_sigmas if memory else SELECTION.retained_sigmas
+    sigmas = (
+        FORWARD_SELECTION.retained_memory_sigmas if memory else FORWARD_SELECTION.retained_sigmas
+    )
     return abs(value - NUMBERS[name].model) > sigmas * error
 
 
@@ -89,7 +91,7 @@ class ForwardSelection:
         """Return the law found, with the departures that the recording asks for."""
         mode, tests = found.mode, found.tests
         rejected: set[str] = set()
-        for index in range(SELECTION.rounds):
+        for index in range(FORWARD_SELECTION.rounds):
             names = self._closed_names(mode, rejected)
             if index > 0 or tests is None:
                 tests = score_tests(self.search, mode, names) if names else None
@@ -146,17 +148,20 @@ class ForwardSelection:
             estimate, _ = tests.of(name)
             if name not in (*STRENGTHS, *FLOATING) and self._is_candidate(name, sigmas, estimate):
                 candidates[name] = _within(name, NUMBERS[name].model + estimate)
-        rivals = set(DRAG_SHAPES) & set(candidates)
-        for name in sorted(rivals, key=lambda name: abs(tests.sigmas[name]))[:-1]:
+        alternatives = set(DRAG_SHAPES) & set(candidates)
+        for name in sorted(alternatives, key=lambda name: abs(tests.sigmas[name]))[:-1]:
             del candidates[name]
         strengths = [name for name in STRENGTHS if name in tests.names]
         if strengths:
             joint = tests.chi_squared(dict.fromkeys(strengths, 0.0))
             largest = max(abs(tests.of(name)[0]) for name in strengths)
-            if joint > SELECTION.strength_chi_squared and largest > SELECTION.strength:
+            if (
+                joint > FORWARD_SELECTION.strength_chi_squared
+                and largest > FORWARD_SELECTION.strength
+            ):
                 found = tests.together(strengths)
                 candidates.update({name: _within(name, value) for name, value in found.items()})
-        if pulses is not None and pulses.significant and pulses.amplitude > SELECTION.pulse:
+        if pulses is not None and pulses.significant and pulses.amplitude > FORWARD_SELECTION.pulse:
             candidates.update(zip(PULSES, (pulses.cosine, pulses.sine), strict=True))
             candidates["pulse_frequency"] = pulses.frequency
         return candidates
@@ -165,7 +170,7 @@ class ForwardSelection:
         if name in ("force_memory", "time_variance", "linear_share") and estimate < 0.0:
             return False
         memory = name == "force_memory"
-        least = SELECTION.memory_sigmas if memory else SELECTION.opened_sigmas
+        least = FORWARD_SELECTION.memory_sigmas if memory else FORWARD_SELECTION.opened_sigmas
         return abs(sigmas) > least and abs(estimate) > self.least.get(name, 0.0)
 
     def _open(self, mode: Mode, candidates: Mapping[str, float]) -> tuple[Mode, set[str]]:
@@ -220,12 +225,12 @@ class ForwardSelection:
         """
         values, covariance = mode.values_of(STRENGTHS)
         ends = np.array([name in CHANGES for name in STRENGTHS], dtype=np.float64)
-        error = math.hypot(math.sqrt(ends @ covariance @ ends), 0.5 * SELECTION.strength)
-        if abs(ends @ values) > SELECTION.retained_sigmas * error:
+        error = math.hypot(math.sqrt(ends @ covariance @ ends), 0.5 * FORWARD_SELECTION.strength)
+        if abs(ends @ values) > FORWARD_SELECTION.retained_sigmas * error:
             return True
-        covariance = covariance + (0.5 * SELECTION.strength) ** 2 * np.eye(values.size)
+        covariance = covariance + (0.5 * FORWARD_SELECTION.strength) ** 2 * np.eye(values.size)
         chi_squared = float(values @ np.linalg.solve(covariance, values))
-        return chi_squared > SELECTION.retained_chi_squared
+        return chi_squared > FORWARD_SELECTION.retained_chi_squared
 
     def without(self, mode: Mode, idle: Set[str]) -> Mode | None:
         """Return the mode without some opened numbers; nothing where the search breaks down."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.progress import Course, tell_nobody
+from driftwalk.core.progress import StagedProgress, ignore_progress
 from driftwalk.likelihood.filter.filter_pass import log_densities
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
@@ -82,7 +82,7 @@ def compare_laws(
     Raises
     ------
     InputError
-        When the recordings are not those of the fit.
+        When the recordings do not belong to the fit.
 
     Examples
     --------
@@ -97,10 +97,10 @@ def compare_laws(
     # Without the numbers of the fit there is nothing to begin a search from.
     if not undetermined(fit):
         estimate = estimate_of(fit, recordings, body=body)
-        course = Course(tell or tell_nobody, _usual_parts(estimate.point))
+        staged = StagedProgress(tell or ignore_progress, _usual_parts(estimate.point))
         for name, law in LAWS.items():
-            course.begin(name)
-            found[name] = _under(estimate, *law, passed=_counted(course, name, estimate))
+            staged.begin(name)
+            found[name] = _under(estimate, *law, passed=_counted(staged, name, estimate))
     means = {name: float(np.nanmean(one.scores)) for name, one in found.items() if one is not None}
     best = max(means, key=means.__getitem__) if means else None
     columns = {
@@ -123,9 +123,9 @@ def _usual_parts(point: Point) -> dict[str, float]:
     return {name: 1.0 if floating == own else 3.0 for name, (floating, _) in LAWS.items()}
 
 
-def _counted(course: Course, name: str, estimate: Estimate) -> Passed:
+def _counted(staged: StagedProgress, name: str, estimate: Estimate) -> Passed:
     """Return what hears of the passes of one law's search."""
-    said, done = course.stage(name), 0
+    said, done = staged.stage(name), 0
 
     def passed(_work: float) -> None:
         nonlocal done

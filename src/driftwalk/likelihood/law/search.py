@@ -34,7 +34,7 @@ from driftwalk.likelihood.newton import (
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.start import Starts
-from driftwalk.schema.answers.force_law import SELECTION
+from driftwalk.schema.answers.force_law import FORWARD_SELECTION
 
 
 class LawPolicy(NamedTuple):
@@ -48,8 +48,8 @@ class LawPolicy(NamedTuple):
     deviations. Under the
     paper's law eight floating bodies had one of 3 to 18 (docs/explanation/likelihood.md)."""
     decisive_evidence: float = 100.0
-    """Difference of the log evidences that nothing missing has feigned. Measured: pulses of the
-    flow feigned 10; right laws are ahead by 130 and more where the recording tells them at all."""
+    """Difference of the log evidences that no missing effect has imitated. Measured: pulses of the
+    flow imitated 10; right laws are ahead by 130 and more where the recording tells them at all."""
     slight_sigmas: float = 4.0
     """A power of the drag that is too slight to be opened widens the intervals from this score test
     on [standard deviations]: chance exceeds it once in 16,000. A power of 2.12 had 5.4 in ten
@@ -97,7 +97,7 @@ class LawSearch:
         assumptions: Assumptions,
         undisturbed: Callable[[], Sequence[Series]],
     ) -> None:
-        """Keep the search, and what makes the series without contacts and mistakes."""
+        """Keep the search, and what makes the series without contacts and outliers."""
         self.assumptions, self.search = assumptions, search
         self.selection = ForwardSelection(search, assumptions)
         self.confounders = Confounders(search, self.selection, undisturbed)
@@ -113,21 +113,25 @@ class LawSearch:
             ),
         )
         base = self._base(starts, weights)
-        found = self._beside(base, "departures from it", lambda: self.selection.select(base))
+        found = self._try_search(base, "departures from it", lambda: self.selection.select(base))
         if "drag_power" in self.assumptions.tried and self._turns_by_itself(base.mode):
-            found = self._beside(
+            found = self._try_search(
                 found,
                 "another power of the drag",
                 lambda: self._powered(base, found, starts, weights),
             )
-        found = self._beside(found, "the other law", lambda: self._reconsidered(found, starts))
-        found = self._beside(found, "other explanations", lambda: self._supported(found))
-        found = self._beside(
+        found = self._try_search(found, "the other law", lambda: self._reconsidered(found, starts))
+        found = self._try_search(found, "other explanations", lambda: self._supported(found))
+        found = self._try_search(
             found, "a slight power of the drag", lambda: self._with_slight_power(found)
         )
-        return self._beside(found, "the other law", lambda: self._with_rival(found, starts))
+        return self._try_search(
+            found, "the other law", lambda: self._with_alternative(found, starts)
+        )
 
-    def _beside(self, found: LawResult, what: str, search: Callable[[], LawResult]) -> LawResult:
+    def _try_search(
+        self, found: LawResult, what: str, search: Callable[[], LawResult]
+    ) -> LawResult:
         """Return what a further search finds; the law found before it where it breaks down."""
         try:
             return replace(search(), left_out=found.left_out)
@@ -139,7 +143,10 @@ class LawSearch:
     ) -> LawResult:
         """Return the law with another power of the drag where it has more evidence."""
         powered = self._with_power(base, starts, weights)
-        if powered is not None and self._ahead(powered.mode, found.mode) > SELECTION.least_evidence:
+        if (
+            powered is not None
+            and self._ahead(powered.mode, found.mode) > FORWARD_SELECTION.least_evidence
+        ):
             return powered
         return found
 
@@ -156,7 +163,7 @@ class LawSearch:
                 return self._undoubted(paper, tests)
         if paper is None:
             return self._compared(starts, weights, paper)
-        return self._beside(
+        return self._try_search(
             self._alone(paper, floating=False),
             "the other law",
             lambda: self._compared(starts, weights, paper),
@@ -177,7 +184,7 @@ class LawSearch:
         if linear > LAW.doubted_linear_sigmas:
             return True
         numbers = set(sigmas) - set(FLOATING)
-        if any(abs(sigmas[name]) > SELECTION.opened_sigmas for name in numbers):
+        if any(abs(sigmas[name]) > FORWARD_SELECTION.opened_sigmas for name in numbers):
             return True
         return self._turns_by_itself(paper) or self._stays_on_a_small_orbit()
 
@@ -201,7 +208,7 @@ class LawSearch:
         own = tests.chi_squared(dict.fromkeys(names, 0.0))
         other = tests.chi_squared({name: FLOATING[name] for name in names})
         apart = 0.5 * (other - own)
-        settled_by = max(apart, 0.0) if apart < SELECTION.least_evidence else math.inf
+        settled_by = max(apart, 0.0) if apart < FORWARD_SELECTION.least_evidence else math.inf
         return replace(self._alone(paper, floating=False), settled_by=settled_by, tests=tests)
 
     def _compared(self, starts: Starts, weights: Weights, paper: Mode | None) -> LawResult:
@@ -221,7 +228,7 @@ class LawSearch:
         ahead = evidence.get("floating", -math.inf) - evidence.get("paper", -math.inf)
         whole = series is search.passes.series
         held = FROM_NEAR if whole else FROM_ANOTHER
-        if ahead >= SELECTION.least_evidence:
+        if ahead >= FORWARD_SELECTION.least_evidence:
             near = found["floating"]
             mode: Mode | None = near
             if not (near.converged and whole):
@@ -255,9 +262,9 @@ class LawSearch:
         """Return the law with another power of the drag, where it explains why the block turns.
 
         A flow that was fitted under the power 2 can take up a drag of another one. Its score test
-        is then blind, no search from there finds it, and what is left is a block that turns
-        otherwise than its drag makes it. So the search begins again. A marker that is off or pulses
-        of the flow make the block turn as well: the caller compares the law with them.
+        is then blind, no search from there finds it, and what is left is a block whose turning its
+        drag does not explain. So the search begins again. A marker that is off or pulses of the
+        flow make the block turn as well: the caller compares the law with them.
         """
         start = starts.floating[0] if base.floating else starts.paper
         point = replace(start, opened={**start.opened, **DRAGS["power"].opened})
@@ -266,7 +273,7 @@ class LawSearch:
             mode is None
             or not mode.converged
             or not is_retained(mode, "drag_power", self.selection.least)
-            or self._ahead(mode, base.mode) <= SELECTION.least_evidence
+            or self._ahead(mode, base.mode) <= FORWARD_SELECTION.least_evidence
         ):
             return None
         return self.selection.select(replace(base, mode=mode, tests=None))
@@ -283,16 +290,16 @@ class LawSearch:
             return found
         if found.settled_by > LAW.decisive_evidence and not self._is_challenged(mode):
             return found
-        rival = self._other_law(found, starts)
-        if rival is None:
+        alternative = self._other_law(found, starts)
+        if alternative is None:
             return found
-        ahead = self._ahead(rival, mode)
-        if ahead <= SELECTION.least_evidence:
+        ahead = self._ahead(alternative, mode)
+        if ahead <= FORWARD_SELECTION.least_evidence:
             return found
         prior = self.search.prior
-        paper, floating = (rival, mode) if found.floating else (mode, rival)
+        paper, floating = (alternative, mode) if found.floating else (mode, alternative)
         evidence = {"paper": evidence_of(paper, prior), "floating": evidence_of(floating, prior)}
-        other = LawResult(rival, rival, not found.floating, evidence, ahead, None)
+        other = LawResult(alternative, alternative, not found.floating, evidence, ahead, None)
         return self.selection.select(other)
 
     def _other_law(self, found: LawResult, starts: Starts) -> Mode | None:
@@ -302,8 +309,8 @@ class LawSearch:
         fixed |= {} if found.floating else FLOATING
         tries = (starts.paper,) if found.floating else starts.floating
         points = [replace(one, opened=mode.point.opened, fixed=fixed) for one in tries]
-        rival = self._from_afar(points, mode.weights)
-        return rival if rival is not None and rival.converged else None
+        alternative = self._from_afar(points, mode.weights)
+        return alternative if alternative is not None and alternative.converged else None
 
     def _supported(self, found: LawResult) -> LawResult:
         """Return the law without the numbers that other explanations account for."""
@@ -314,10 +321,12 @@ class LawSearch:
             return found
         closed = self.selection.without(mode, set(objections)) or found.base
         unsettled = (*found.unsettled, *objections.values())
-        return replace(found, mode=closed, unsettled=unsettled, rivals=(*found.rivals, mode))
+        return replace(
+            found, mode=closed, unsettled=unsettled, alternatives=(*found.alternatives, mode)
+        )
 
     def _with_slight_power(self, found: LawResult) -> LawResult:
-        """Return the law, and as a rival the one whose drag has a slightly different power.
+        """Return the law, and as an alternative the one whose drag has a slightly different power.
 
         A power below its least effect stays closed: it may be an error of the filter. It may be
         real as well, and then C_d is another one: a power of 2.12 made it 7.5 % too large, with an
@@ -338,11 +347,11 @@ class LawSearch:
         if mode is None:
             return found
         why = (
-            f"{number_sentence(mode, name)} would fit better, but errors of the filter may feign "
-            "it: it was not opened, and the intervals of C_d and σ_F hold those with it too"
+            f"{number_sentence(mode, name)} would fit better, but errors of the filter can imitate "
+            "it: it was not opened, and the intervals of C_d and σ_F also cover the fit with it"
         )
         change = mode.point.log_drag - found.mode.point.log_drag
-        found = replace(found, rivals=(*found.rivals, mode))
+        found = replace(found, alternatives=(*found.alternatives, mode))
         if abs(change) <= LAW.slight_drag:
             return replace(found, noted=(*found.noted, why))
         size = "larger" if change > 0.0 else "smaller"
@@ -350,21 +359,21 @@ class LawSearch:
         why += "you know it"
         return replace(found, unsettled=(*found.unsettled, why))
 
-    def _with_rival(self, found: LawResult, starts: Starts) -> LawResult:
+    def _with_alternative(self, found: LawResult, starts: Starts) -> LawResult:
         """Return the law, and the other one as well where the recording cannot tell them."""
         blind = found.floating and self.search.passes.body.orientation == "none"
-        least = LAW.without_orientation if blind else SELECTION.least_evidence
+        least = LAW.without_orientation if blind else FORWARD_SELECTION.least_evidence
         if self.assumptions.pressure_gradient != "auto" or found.settled_by >= least:
             return found
-        rival = self._other_law(found, starts)
-        if rival is None:
+        alternative = self._other_law(found, starts)
+        if alternative is None:
             return found
         why = (
-            "the recording cannot tell the paper's force law from a floating body's: the intervals "
-            "of C_d and σ_F hold those of both; state the law if you know it"
+            "the paper's force law and the law of a floating body fit the recording equally well: "
+            "the intervals of C_d and σ_F cover both; state the law if you know it"
         )
         unsettled = (*found.unsettled, why)
-        return replace(found, unsettled=unsettled, rivals=(*found.rivals, rival))
+        return replace(found, unsettled=unsettled, alternatives=(*found.alternatives, alternative))
 
     def _is_challenged(self, mode: Mode) -> bool:
         """Return whether the score tests of a floating body's numbers contradict the law."""

@@ -390,7 +390,7 @@ class ProgramPool:
                 program.greeting = self.ask(program, PARAMETERS_REQUEST, stop)
             result = work(program)
         except BaseException:
-            # Nobody knows what it would write next.
+            # What it would write next is unknown.
             program.close()
             raise
         self._idle.append(program)

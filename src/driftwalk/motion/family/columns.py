@@ -1,6 +1,6 @@
 """The native core's table of a particle's numbers: one row per world.
 
-The columns are those of `cpp/include/driftwalk/particle/columns.hpp`, in the same order.
+The columns are the ones of `cpp/include/driftwalk/particle/columns.hpp`, in the same order.
 """
 
 from __future__ import annotations

@@ -141,7 +141,7 @@ def assembly_summary(
     paragraphs = [f"{done}.", _most_common(distribution, named=sizes is None)]
     shown = [parts.figure_with_ends(distribution, "complete", "complete: one assembly")]
     if drawn is not None:
-        paragraphs.append(_beside(distribution, drawn, classes=sizes is None))
+        paragraphs.append(_comparison_with_drawn(distribution, drawn, classes=sizes is None))
         shown.append(parts.figure_with_ends(drawn, "complete", "complete, parameters drawn"))
     if sizes is not None:
         shown += size_numbers(sizes)
@@ -210,7 +210,7 @@ def _parameters(distribution: xr.Dataset, assembly: xr.Dataset | None) -> str:
     return values + redrawn
 
 
-def _beside(distribution: xr.Dataset, drawn: xr.Dataset, *, classes: bool) -> str:
+def _comparison_with_drawn(distribution: xr.Dataset, drawn: xr.Dataset, *, classes: bool) -> str:
     """Return how far the runs with drawn parameters are from the others."""
     require(drawn, "class", "proportion")
     words = [axis_number(name).plain for name in str(drawn.attrs.get("drawn", "")).split()]

@@ -22,17 +22,17 @@ if TYPE_CHECKING:
 ABSORBED: Final = "A tenth without a point: the fitted flow has absorbed what would be seen there."
 
 LOOKS_FOR: Final = {
-    "autocorrelation": "An error of prediction that depends on the errors before it.",
-    "tails": "Large errors that are more frequent than normal errors are.",
-    "outliers": "Single positions that the tracker has put elsewhere.",
-    "place": "A part of the tank where the flow pushes otherwise than the fitted one.",
-    "time and place": "A flow that is another one in some part of the recording.",
+    "autocorrelation": "Prediction errors that depend on the ones before them.",
+    "tails": "More large errors than a normal distribution has.",
+    "outliers": "Single positions that the tracker got wrong.",
+    "place": "A part of the tank where the flow differs from the fitted one.",
+    "time and place": "A time in which the flow differs in some part of the tank.",
     "flow strength": "A flow that gets stronger or weaker.",
     "drag law": "A drag that fits slow motion and not fast motion, or the other way round.",
     "noise by place": "A part of the tank where the errors are larger, as under a lamp.",
     "noise by time": "A part of the recording where the errors are larger.",
     "change": "A moment at which the flow changes.",
-    "steps": "Steps and turns that differ from those of simulated recordings (KS distance).",
+    "steps": "Steps and turns that differ from simulated recordings (KS distance).",
     "measured flow": "A measured flow that differs from the fitted one.",
     "measured scale": "A scale that is wrong: measured and fitted flow differ by a factor.",
 }
@@ -128,7 +128,7 @@ def _noise_ratio(check: xr.Dataset) -> Section:
     off = (check["noise_ratio"].values - 1.0) / check["noise_ratio_std"].values
     top = max(LEAST_TOP, float(np.nanmax(np.abs(off), initial=0.0)))
     return _field(
-        check, off, "Mean square of the errors relative to that of all cells.",
+        check, off, "Mean squared error of each cell, relative to all cells.",
         words="off the mean (standard deviations)", diverging=True, limits=[-top, top],
     )  # fmt: skip
 

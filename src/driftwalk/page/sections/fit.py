@@ -18,8 +18,8 @@ from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.schema.answers.facts import facts_of, sentences
 from driftwalk.schema.answers.fit import model_estimates
 from driftwalk.schema.answers.force_law import (
+    FORWARD_SELECTION,
     LINEAR_DRAG_ALONE,
-    SELECTION,
     compared_laws,
     law_estimates,
     law_limits,
@@ -140,9 +140,9 @@ def _what_was_done(fit: xr.Dataset) -> str:
         pieces.append(quantity(duration, "s"))
     if samples is not None and used is not None:
         pieces.append(f"{int(used)} of {int(samples)} samples used")
-    left_out, put_in = (value_of(fit, name) for name in ("mistakes", "dropped_frames"))
+    left_out, put_in = (value_of(fit, name) for name in ("outliers", "dropped_frames"))
     if left_out:
-        pieces.append(f"{int(left_out)} left out as mistakes of the tracker")
+        pieces.append(f"{int(left_out)} left out as outliers of the track")
     if put_in:
         pieces.append(f"the time of {count(int(put_in), 'dropped frame')} put in")
     wall = value_of(fit, "wall_share")
@@ -210,7 +210,7 @@ def _noise(fit: xr.Dataset) -> Noise | None:
 
 
 def law_sections(fit: xr.Dataset) -> list[Section]:
-    """Return the sections on the force law, its rivals, and the wall."""
+    """Return the sections on the force law, its alternatives, and the wall."""
     facts = facts_of(fit)
     made = []
     rows = law_words(facts)
@@ -299,10 +299,10 @@ def _tested(fit: xr.Dataset) -> Section | None:
     note = (
         "The last score tests of the search: estimates of numbers that are not in the fit, in "
         "their standard deviations; 0 is the model. A number is fitted from "
-        f"{SELECTION.opened_sigmas:g} on (the memory of the force from "
-        f"{SELECTION.memory_sigmas:g} on) if it is large enough to matter, and "
-        "stays if the fit finds it too. Small errors of the fitted flow can look like a weaker "
-        "one: the check of the model says whether anything is missing from it."
+        f"{FORWARD_SELECTION.opened_sigmas:g} on (the memory of the force from "
+        f"{FORWARD_SELECTION.memory_sigmas:g} on) if it is large enough to matter, and stays if "
+        "the fit finds it too. Small errors of the fitted flow can look like a weaker one: the "
+        "check of the model says whether anything is missing from it."
     )
     columns = ["what was tested", "standard deviations from the model", "why it is not in the fit"]
     return parts.table_section("tested", "Tested, and not in the fit", columns, rows, note)
@@ -310,7 +310,11 @@ def _tested(fit: xr.Dataset) -> Section | None:
 
 def _why(name: str, sigmas: float) -> str:
     """Return why a number that was tested is not in the fit."""
-    least = SELECTION.memory_sigmas if name == "force_memory" else SELECTION.opened_sigmas
+    least = (
+        FORWARD_SELECTION.memory_sigmas
+        if name == "force_memory"
+        else FORWARD_SELECTION.opened_sigmas
+    )
     if not isfinite(sigmas):
         return "it has no estimate"
     # Chance exceeds two standard deviations in one test of twenty.

@@ -247,8 +247,8 @@ def _recording(calibration: xr.Dataset, recording: xr.Dataset | None) -> dict[st
 
 def _note(calibration: xr.Dataset, cells: dict[str, Any] | None) -> str:
     words = [
-        "D is the KS distance between the steps of the recording and those of a simulation with "
-        "these parameters; 1 − D is shown."
+        "D is the KS distance between the steps of the recording and of a simulation with these "
+        "parameters; 1 − D is shown."
     ]
     floor = value_of(calibration, "noise_floor")
     if floor is not None:

@@ -84,9 +84,9 @@ def calibration_summary(found: xr.Dataset) -> Section:
         parts.figure("step interval", required(found, "step_interval_s"), "s"),
         parts.figure("duration", required(found, "duration_s"), "s"),
     ]
-    if "misfit" in found:
-        shown.append(parts.figure("misfit of the summaries", found["misfit"]))
-        shown.append(parts.figure("usual misfit", found["usual_misfit"]))
+    if "discrepancy" in found:
+        shown.append(parts.figure("discrepancy of the summaries", found["discrepancy"]))
+        shown.append(parts.figure("usual discrepancy", found["discrepancy_median"]))
     return parts.summary_section(paragraphs, shown)
 
 
@@ -109,17 +109,17 @@ def values_section(found: xr.Dataset) -> Section:
     return parts.table_section(
         "values", "Values",
         ["parameter", "value", "interval", "determined", "range", "meaning"], rows,
-        "A parameter is determined where its 90 % interval ends within 15 % of its value, "
-        "unless the misfit is above four times the usual.",
+        "A parameter is determined where its 90 % interval ends within 15 % of its value, unless "
+        "the discrepancy is above four times the usual.",
     )  # fmt: skip
 
 
 def draws_section(found: xr.Dataset) -> Section:
     """Return the chart of the draws of each parameter, over its estimate."""
-    require(found, "draws", "estimate")
+    require(found, "posterior_sample", "estimate")
     drawn = []
     for one in each(found, "parameter"):
-        values = np.sort(one["draws"].values) / float(one["estimate"])
+        values = np.sort(one["posterior_sample"].values) / float(one["estimate"])
         share = np.linspace(0.0, 1.0, values.size)
         drawn.append(parts.series(str(one["parameter"].values), values, share))
     return parts.chart(
@@ -222,25 +222,25 @@ def ranking_section(comparison: xr.Dataset) -> Section:
 
 def summaries_section(comparison: xr.Dataset) -> Section:
     """Return the table of models that were compared by the summaries of the motion."""
-    names = ("misfit", "usual_misfit", "most_misfit")
-    require(comparison, "asked", "named", "unlikely", *names)
+    names = ("discrepancy", "discrepancy_median", "discrepancy_q95")
+    require(comparison, "asked", "named", "deviance", *names)
     asked = comparison.isel(model=np.flatnonzero(comparison["asked"].values))
-    least = float(asked["unlikely"].min())
+    least = float(asked["deviance"].min())
     rows = [
         [
             one["model"].item(),
             *(number(one[name]) for name in names),
-            number(one["unlikely"] - least),
+            number(one["deviance"] - least),
             "yes" if bool(one["named"]) else "no",
         ]
         for one in each(asked, "model")
     ]
-    columns = ["model", "misfit", "of own recordings, median", "99 % below", "less likely by"]
+    columns = ["model", "discrepancy", "of own recordings, median", "95 % below", "less likely by"]
     return parts.table_section(
         "summaries", "Summaries of the motion", [*columns, "named"], rows,
-        "About a hundred numbers of the motion, matched by the closest models. The "
-        "misfit is compared with those of the model's own simulated recordings; the evidence, as "
-        "-2 log above the likeliest model, has a price for each parameter.",
+        "About a hundred numbers of the motion, matched by the closest models. The discrepancy is "
+        "compared with the model's own simulated recordings; the evidence, as -2 log above the "
+        "likeliest model, has a price for each parameter.",
     )  # fmt: skip
 
 

@@ -205,7 +205,7 @@ def _by_body(
 ) -> Mapping[str, Noise | None]:
     if isinstance(noise, Mapping):
         return noise
-    # Of several bodies nobody knows which one's it is.
+    # Of several bodies it is unknown which one's it is.
     return {chosen[0]: noise} if len(chosen) == 1 else {}
 
 

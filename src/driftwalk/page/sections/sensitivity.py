@@ -92,8 +92,8 @@ def sensitivity_summary(sensitivity: xr.Dataset, reference: xr.Dataset | None) -
     names = " and ".join(axis_number(str(dim)).plain for dim in distance.dims)
     runs = int(np.nanmax(sensitivity["runs"].values))
     done = (
-        f"Self-assembly was simulated at {count(int(distance.size), 'setting')} of the {names}, "
-        f"up to {count(runs, 'run')} each, and its outcomes were compared with those of a reference"
+        f"Self-assembly was simulated at {count(int(distance.size), 'setting')} of the {names}, up "
+        f"to {count(runs, 'run')} each, and its outcomes were compared with a reference"
     )
     if reference is not None and "drag_coefficient" in reference.attrs:
         done += (

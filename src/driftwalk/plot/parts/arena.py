@@ -21,7 +21,7 @@ CM_PER_M = FACTORS["m", "cm"]
 
 
 def arena_of(dataset: xr.Dataset, arena: Mapping[str, Any] | str | None = None) -> dict[str, Any]:
-    """Return the arena as a dictionary, empty when nobody knows it.
+    """Return the arena as a dictionary, empty when it is unknown.
 
     Parameters
     ----------

@@ -531,7 +531,7 @@ def _lines(text: str, letters: int) -> list[str]:
 
 
 def name_text(name: str) -> str:
-    """Return the name of a class as a figure writes it: empty for a code, which nobody can read.
+    """Return the name of a class as a figure writes it: empty for a code, which has no meaning.
 
     Examples
     --------

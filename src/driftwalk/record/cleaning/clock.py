@@ -8,7 +8,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.raw import CLOCK_UNITS, Array, RawRecording
-from driftwalk.record.tables.stamps import count_on
+from driftwalk.record.tables.date_stamps import count_on
 
 
 class ClockPolicy(NamedTuple):

@@ -34,7 +34,7 @@ from driftwalk.record.tables.matlab import (
     only_matlab,
 )
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
-from driftwalk.record.vocabulary import ALLOWED
+from driftwalk.record.unit_and_column_words import ALLOWED
 from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, matlab_variables
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 

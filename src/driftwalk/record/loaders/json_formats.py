@@ -17,7 +17,7 @@ from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.tables.in_memory import MemorySource, objects
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import header_rows, open_binary
-from driftwalk.record.vocabulary import words
+from driftwalk.record.unit_and_column_words import words
 
 _MOST_NUMBERS: Final = 16
 """Length of a list up to which each of its numbers becomes a column; chosen by hand."""

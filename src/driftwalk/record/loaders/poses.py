@@ -145,7 +145,7 @@ def _header(path: Path) -> list[list[str]]:
         raise FormatError("the header rows have different numbers of fields", line=count)
     if len(rows) > count and not is_number(rows[count][0]):
         raise FormatError(
-            "the rows are named by images, as those of labelled frames are, which are no track: "
+            "the rows are named by images, as labelled training frames are; they are not a track: "
             "give the file of the analysed video",
             line=count + 1,
         )

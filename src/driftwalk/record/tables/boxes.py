@@ -14,7 +14,7 @@ from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.cleaning.clean import rows_of_bodies
 from driftwalk.record.column_names import ColumnMeaning, split_brackets, words_of
 from driftwalk.record.raw import Array, ReadOptions, TableLayout
-from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS, words
+from driftwalk.record.unit_and_column_words import BOXES, LENGTHS, NO_UNIT, UNITS, words
 
 if TYPE_CHECKING:
     from driftwalk.record.tables.in_memory import TableSource

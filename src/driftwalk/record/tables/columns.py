@@ -12,6 +12,7 @@ from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
 from driftwalk.record.raw import LENGTH_UNITS, MISSING, ReadOptions
 from driftwalk.record.tables.boxes import find_box
+from driftwalk.record.tables.date_stamps import OF_DAY
 from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.tables.named_columns import (
     ColumnReading,
@@ -20,8 +21,7 @@ from driftwalk.record.tables.named_columns import (
     may_be_unit,
     shown,
 )
-from driftwalk.record.tables.stamps import OF_DAY
-from driftwalk.record.vocabulary import ALLOWED, FRONT, LENGTHS, MIDDLE, PARTS, REAR
+from driftwalk.record.unit_and_column_words import ALLOWED, FRONT, LENGTHS, MIDDLE, PARTS, REAR
 
 _ON_GLOBE: Final = ("lon", "lat")
 
@@ -112,7 +112,7 @@ class _Reader(NamedColumns):
             self._find_confidences()
 
     def _leave_out_the_third_axis(self) -> None:
-        """Leave out heights that nobody asks for, and parts of quaternions that are not whole."""
+        """Leave out heights that are not asked for, and parts of quaternions that are not whole."""
         turned = self._turned()
         parts = {at: one for at, one in self.meanings.items() if one.quantity in QUATERNION}
         loose = [at for at, one in parts.items() if one.body not in turned]
@@ -342,7 +342,7 @@ def _agreed(units: list[str], what: str, quantity: str) -> str:
     if len(set(units)) > 1:
         shown = ", ".join(unit or "none" for unit in sorted(set(units)))
         raise InputError(
-            f"the columns of {what} name different units ({shown}): state that of each, as in "
+            f"the columns of {what} name different units ({shown}): state the unit of each, as in "
             f"{argument_text('columns', {quantity: 'NAME:UNIT'})}"
         )
     return units[0] if units else ""

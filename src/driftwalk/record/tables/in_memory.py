@@ -20,7 +20,7 @@ from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.raw import MISSING, Array, TableLayout
-from driftwalk.record.tables.stamps import (
+from driftwalk.record.tables.date_stamps import (
     MOMENT,
     OF_DAY,
     RowError,

@@ -12,7 +12,7 @@ from driftwalk.record.raw import ReadOptions
 from driftwalk.record.space import Plane
 from driftwalk.record.tables.boxes import Box
 from driftwalk.record.tables.in_memory import TableSource
-from driftwalk.record.vocabulary import ALLOWED, PARTS, ROOTS, SETPOINTS, UNITS, VARIANTS
+from driftwalk.record.unit_and_column_words import ALLOWED, PARTS, ROOTS, SETPOINTS, UNITS, VARIANTS
 
 _WORDS: Final = {"t": "time", "t+": "fraction of the time", "frame": "frame number", "w": "width"}
 _WORDS_MORE: Final = {"h": "height", "theta": "orientation", "body": "name of the body"}
@@ -181,8 +181,8 @@ class NamedColumns:
             if len(setpoints) > 1:
                 raise InputError(self._one_of(setpoints))
             self.result.notes.append(
-                f"'{setpoints[0]}' is read as a body, though its name is that of a setpoint: "
-                "there is no other pair of x and y"
+                f"'{setpoints[0]}' is read as a body, though its name belongs to a setpoint: there "
+                "is no other pair of x and y"
             )
         left |= self._computed(variants, real)
         for body in [one for one in words if one not in bodies]:

@@ -16,11 +16,11 @@ from driftwalk.record.bad_row import is_number
 from driftwalk.record.cleaning.clean import LARGEST_SHARE, order_in_frame
 from driftwalk.record.column_names import quantity_of
 from driftwalk.record.raw import Array, TableLayout
+from driftwalk.record.tables.date_stamps import RowError
 from driftwalk.record.tables.in_memory import TableSource, as_numbers, objects
 from driftwalk.record.tables.named_columns import LEFT_OUT, TableReading
-from driftwalk.record.tables.stamps import RowError
 from driftwalk.record.text import Table
-from driftwalk.record.vocabulary import ALLOWED, UNITS
+from driftwalk.record.unit_and_column_words import ALLOWED, UNITS
 
 
 class UnevenClockPolicy(NamedTuple):

@@ -25,12 +25,12 @@ from driftwalk.record.raw import (
 from driftwalk.record.space import body_in_plane, on_the_ground, plane_of_columns
 from driftwalk.record.tables.boxes import box_angle, box_centre
 from driftwalk.record.tables.columns import read_columns
+from driftwalk.record.tables.date_stamps import DAY, count_days
 from driftwalk.record.tables.in_memory import TableSource
 from driftwalk.record.tables.named_columns import TableReading
 from driftwalk.record.tables.row_order import body_columns, other_order
-from driftwalk.record.tables.stamps import DAY, count_days
 from driftwalk.record.text import Table
-from driftwalk.record.vocabulary import words
+from driftwalk.record.unit_and_column_words import words
 
 _FULL_TURN: Final = 6.3
 """A full turn in radians, with room for rounding; chosen by hand."""

@@ -20,10 +20,10 @@ from driftwalk.record.bad_row import decoded_line, is_number, split_fields
 from driftwalk.record.column_names import quantity_of
 from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
 from driftwalk.record.tables.columns import read_columns
+from driftwalk.record.tables.date_stamps import StampForm, stamp_form
 from driftwalk.record.tables.in_memory import TABLE, MemorySource
-from driftwalk.record.tables.stamps import StampForm, stamp_form
 from driftwalk.record.text import Table, header_rows, read_head, read_table
-from driftwalk.record.vocabulary import NO_UNIT, UNITS
+from driftwalk.record.unit_and_column_words import NO_UNIT, UNITS
 
 _COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
 _DELIMITER_LINE = re.compile(r"sep=(.)\s*", re.IGNORECASE)

@@ -80,18 +80,26 @@ def model_calibration_answer(found: xr.Dataset) -> Answer:
         f"not seen, the recording's own parts {own_score(found):.2f}"
     )
     parts.append(Row("distance", distance))
-    if "misfit" in found:
+    if "discrepancy" in found:
         said = (
-            f"misfit {float(found['misfit']):.0f}, of the model's own recordings "
-            f"{float(found['usual_misfit']):.0f} (95 % below {float(found['most_misfit']):.0f})"
+            f"discrepancy {float(found['discrepancy']):.0f}, of the model's own recordings "
+            f"{float(found['discrepancy_median']):.0f} (95 % below "
+            f"{float(found['discrepancy_q95']):.0f})"
         )
         parts.append(Row("summaries", said))
     verdict = stored_verdict(found)
     parts += verdict_parts(verdict)
     warnings = sentences(found, "warning")
     numbers = (
-        *("score", "score_std", "searched_score", "matched_score", "misfit", "usual_misfit"),
-        *("most_misfit", "interval_stretch"),
+        *(
+            "score",
+            "score_std",
+            "searched_score",
+            "matched_score",
+            "discrepancy",
+            "discrepancy_median",
+        ),
+        *("discrepancy_q95", "interval_stretch"),
     )
     attributes = ("confidence", "step_interval_s", "duration_s", "position_noise_m", "seed")
     facts = {

@@ -96,7 +96,8 @@ def fitted_parts(fit: xr.Dataset, *, hint: str = "") -> list[Part]:
     fit : xarray.Dataset
         A `fit`.
     hint : str
-        How to have the wall estimated: said where there are enough contacts, and nobody asked.
+        How to have the wall estimated: said where there are enough contacts, and it was not asked
+        for.
     """
     facts, parts = facts_of(fit), origin(fit)
     if facts.get("drag_law") == "linear":

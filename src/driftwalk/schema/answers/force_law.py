@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class SelectionPolicy(NamedTuple):
+class ForwardSelectionPolicy(NamedTuple):
     """When a law is ahead of another, and when a number of a departure is opened and stays open."""
 
     least_evidence: float = 3.0
@@ -55,7 +55,7 @@ class SelectionPolicy(NamedTuple):
     time_noise: float = 0.003
     """Least jitter of the time stamps [s]; chosen by hand."""
     angle_offset_deg: float = 1.0
-    """Least offset of the angle [degrees]. The eight strips of a face feign up to 1.2 degrees in
+    """Least offset of the angle [degrees]. The eight strips of a face imitate up to 1.2 degrees in
     blocks that float and spin fast (two recordings of studies/verdict; one of them was fitted again
     with 32, and no offset was left)."""
     marker: float = 0.012
@@ -66,7 +66,7 @@ class SelectionPolicy(NamedTuple):
     """Least amplitude of a pulse; chosen by hand."""
 
 
-SELECTION: Final = SelectionPolicy()
+FORWARD_SELECTION: Final = ForwardSelectionPolicy()
 
 NOT_SEARCHED: Final = "as stated; the fit tried no other"
 LINEAR_DRAG_ALONE: Final = "none, as the drag is linear"
@@ -155,7 +155,7 @@ def flow_in_time(fit: xr.Dataset) -> str | None:
         modes = [] if "mode_time" not in fit.coords else [_period(fit["mode_time"].values)]
         if "mode_repeat" in fit.attrs:
             time, repeat = fit["mode_time"].values, fit.attrs["mode_repeat"]
-            modes = [f"{time.size} frames, those of the measured flow"]
+            modes = [f"{time.size} frames, taken from the measured flow"]
             modes[0] += "" if repeat == "none" else f"; beyond them: {repeat}"
         return "; ".join([*modes, *([str(left_out)] if left_out else [])]) or None
     time, strength = fit["strength_time"].values, fit["flow_strength"].values
@@ -182,7 +182,7 @@ def _support(facts: Mapping[str, Any], other: str, *, paper: bool) -> str:
     settled = facts.get("law_settled_by")
     if settled is None:
         return ", as far as this recording tells" if paper else ""
-    if settled < SELECTION.least_evidence:
+    if settled < FORWARD_SELECTION.least_evidence:
         return f"; the recording cannot tell it from {other}"
     return f"; {other} is less likely by e^{settled:.0f}"
 
@@ -231,7 +231,7 @@ class ComparedLaw(NamedTuple):
 
 
 def compared_laws(fit: xr.Dataset) -> list[ComparedLaw]:
-    """Return the compared laws, the best first; none where nobody asked for them.
+    """Return the compared laws, the best first; none where they were not asked for.
 
     Parameters
     ----------

@@ -106,14 +106,14 @@ def ranking_table(found: xr.Dataset) -> Table:
         )
         for index, one in enumerate(each(found, "model"))
     ]
-    columns = (*_COLUMNS, *(("misfit",) if asked else ()), "verdict")
+    columns = (*_COLUMNS, *(("discrepancy",) if asked else ()), "verdict")
     return Table(rows, columns, "models, the closest first")
 
 
 def _misfit(one: xr.Dataset) -> str:
     if not bool(one["asked"]):
         return ""
-    return f"{float(one['misfit']):.0f} (own below {float(one['most_misfit']):.0f})"
+    return f"{float(one['discrepancy']):.0f} (own below {float(one['discrepancy_q95']):.0f})"
 
 
 def _verdict(one: xr.Dataset) -> str:
@@ -123,7 +123,7 @@ def _verdict(one: xr.Dataset) -> str:
 def _model(one: xr.Dataset) -> dict[str, Any]:
     ends, summaries = one["end_score"].values, {}
     if "asked" in one and bool(one["asked"]):
-        names = ("misfit", "usual_misfit", "most_misfit", "unlikely")
+        names = ("discrepancy", "discrepancy_median", "discrepancy_q95", "deviance")
         summaries = {"named": bool(one["named"]), **{name: float(one[name]) for name in names}}
     known = one.isel(parameter=np.flatnonzero(np.isfinite(one["estimate"].values)))
     return {

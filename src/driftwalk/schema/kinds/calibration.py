@@ -241,9 +241,9 @@ variables:
     held_out_distance(aspect) [1]: KS distance; odd blocks of time, by the answer for the even \
         ones
     trained_distance(aspect) [1]: KS distance; even blocks
-    check_median(check): fact of the model, median of its worlds
-    check_low(check): smallest of its worlds
-    check_high(check): largest of its worlds
+    check_median(check): fact of the model, median of its replicates
+    check_low(check): smallest of its replicates
+    check_high(check): largest of its replicates
     {_RECORDED}
     score [1]: mean over the aspects of distance over floor; held out
     score_std [1]: its standard error; from leaving blocks out
@@ -255,18 +255,18 @@ variables (the model was searched):
     searched_estimate(parameter): answer of the search by KS distances
     searched_score [1]: score of the search's answer; even blocks
 variables (summaries were matched):
-    draws(draw parameter): values that could have given the recording; a sample of an approximate \
-        posterior with even priors on the scales
+    posterior_sample(draw parameter): values that could have given the recording; an \
+        approximate posterior with even priors on the scales
     matched_score [1]: score of the answer of the summaries; even blocks
-    misfit [1]: sum of the squares of the summaries' deviations; in standard deviations, \
+    discrepancy [1]: sum of the squares of the summaries' deviations; in standard deviations, \
         correlations taken into account
-    usual_misfit [1]: its median over simulated recordings of the model
-    most_misfit [1]: its 95 % quantile over these
-    interval_stretch [1]: factor by which the draws are spread for the misfit
+    discrepancy_median [1]: its median over simulated recordings of the model
+    discrepancy_q95 [1]: its 95 % quantile over these
+    interval_stretch [1]: factor by which the draws are spread for the discrepancy
 variables (summaries were matched and no states changed places):
     profile_value(parameter profile_point): value of the parameter; in its unit
-    profile_misfit(parameter profile_point) [1]: rise of the misfit there, the others at their \
-        best; over the square of the factor by which intervals are widened
+    profile_discrepancy(parameter profile_point) [1]: rise of the discrepancy there, the others at \
+        their best; over the square of the factor by which intervals are widened
 attributes:
     model text: name of the model
     estimate_from text: stage of the estimate: summaries, or search
@@ -302,9 +302,9 @@ variables:
     verdict_reason(model) text: reasons for the verdict, separated by "; "
     held_out_distance(model aspect) [1]: KS distance; {_HELD}
     trained_distance(model aspect) [1]: KS distance; even blocks
-    check_median(model check): fact of the model, median of its worlds
-    check_low(model check): smallest of its worlds
-    check_high(model check): largest of its worlds
+    check_median(model check): fact of the model, median of its replicates
+    check_low(model check): smallest of its replicates
+    check_high(model check): largest of its replicates
     {_RECORDED}
     estimate(model parameter): value of the parameter; NaN where the model has no such parameter
     parameter_unit(parameter) text: unit of the parameter
@@ -315,11 +315,11 @@ variables:
 variables (of two models or more):
     asked(model) bool: whether the summaries of the motion were matched
     named(model) bool: whether the summaries of the motion speak for the model
-    misfit(model) [1]: sum of squares of the deviations of the summaries; in standard deviations; \
-        NaN where it was not asked
-    usual_misfit(model) [1]: its median over the model's own recordings
-    most_misfit(model) [1]: its 95 % quantile over them
-    unlikely(model) [1]: -2 log of the evidence of the summaries; but for a constant that all \
+    discrepancy(model) [1]: sum of squares of the deviations of the summaries; in standard \
+        deviations; NaN where it was not asked
+    discrepancy_median(model) [1]: its median over the model's own recordings
+    discrepancy_q95(model) [1]: its 95 % quantile over them
+    deviance(model) [1]: -2 log of the evidence of the summaries; but for a constant that all \
         models share
 attributes:
     worlds number: worlds by which each model is judged

@@ -44,8 +44,8 @@ attributes:
     target text: outcome class to be reached
     by_s number: deadline
     every_s number: time between two decisions
-    latency_s number: from a look until the pumps have changed
-    missed number: share of the looks without a class
+    latency_s number: time from an observation until the pumps have changed
+    missed number: share of the observations without a class
     dwell_s number: time for which a mode is held at least
     reached number: share of fresh worlds in the target at the deadline
     reached_low number: lower limit of the share
@@ -93,8 +93,8 @@ attributes:
     target text: outcome class to be reached
     by_s number: deadline
     every_s number: time between two decisions
-    latency_s number: from a look until the pumps have changed
-    missed number: share of the looks without a class
+    latency_s number: time from an observation until the pumps have changed
+    missed number: share of the observations without a class
     force_factor number: factor on sigma_F of the worlds
     stated number: share that the plan states
     stated_worlds number: worlds of that share

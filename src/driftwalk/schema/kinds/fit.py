@@ -67,7 +67,7 @@ variables:
         flows
     samples [1] int: samples of the recordings
     samples_used [1] int: samples that were near enough to their prediction
-    mistakes [1] int: samples left out as mistakes of the tracker
+    outliers [1] int: samples left out as outliers of the track
     jumps_removed [1] int: samples left out when the recordings were read, as too far away for the \
         greatest speed
     dropped_frames [1] int: frames that the recording lacks although its stamps do not say so; \
@@ -228,7 +228,7 @@ variables (the wall was estimated, from eight passages or more):
     wall_restitution_interval(bound) [1]: its interval
     wall_friction [1]: friction of the wall
     wall_friction_interval(bound) [1]: its interval; infinite where every contact may stick
-variables (a recording has hardly any noise of a camera):
+variables (a recording has almost no camera noise):
     added_position_noise [m]: white noise that was added to its positions; the largest of all \
         recordings
     added_orientation_noise [rad]: the same of its orientations
@@ -296,10 +296,10 @@ LAW_NUMBERS: Final = (
            note="C_d over 1 + added mass / mass"),
     Number("effective_force_std", "N", "σ_F per effective mass", shown="mN",
            note="σ_F over 1 + added mass / mass"),
-    Number("linear_drag", "kg s-1", shown="g/s", note="C_d is that of the quadratic part alone"),
+    Number("linear_drag", "kg s-1", shown="g/s", note="C_d is of the quadratic part alone"),
     Number("drag_power", label="power of the drag", note="C_d holds at 3 cm/s"),
     Number("force_memory", "s", "memory of the force", shown="s",
-           note="correlation time; σ_F is that of a white force, as strong at low frequencies"),
+           note="correlation time; σ_F is of a white force that is as strong at low frequencies"),
     Number("time_stamp_noise", "s", "jitter of the stamps", shown="ms",
            note="standard deviation of the time stamps; corrected"),
     Number("orientation_offset", "rad", shown="°", note="between marker and faces; corrected"),

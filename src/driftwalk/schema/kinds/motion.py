@@ -51,7 +51,7 @@ attributes (the block was stated):
     block_depth_m number: wetted depth of a side face
     block_depth text: immersed or archimedes, instead of a length
 attributes (several tanks in one recording):
-    bodies_apart yes or no: whether each body has a tank of its own
+    bodies_apart yes or no: whether each body has its own tank
 attributes (simulated):
     simulated yes or no: whether a model made the motion
 attributes (simulated by driftwalk):

@@ -1,4 +1,4 @@
-"""The door for NetCDF files, in and out.
+"""Reading and writing NetCDF files.
 
 Reading: their declared size first, then whole into memory.
 

@@ -2,8 +2,8 @@
 
 A body that is hidden may be mistaken for something that turns up nearby. So a detection that is not
 far more likely than "the body was missed, and this is something else" is taken with a reservation:
-the track keeps, as its rival, what it was before. Both are followed, and each later frame is taken
-by the one that fits it better, given all since. The rival is dropped when it has become
+the track keeps, as its alternative, what it was before. Both are followed, and each later frame is
+taken by the one that fits it better, given all since. The alternative is dropped when it has become
 improbable; when it becomes the likelier one, the track goes back to it, without the samples.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.track.follow.kalman import Measured, edge_costs
 from driftwalk.track.follow.settings import TrackerSettings
-from driftwalk.track.follow.tracks import Rival, Track, predicted_of
+from driftwalk.track.follow.tracks import Alternative, Track, predicted_of
 
 
 class MarkPolicy(NamedTuple):
@@ -67,9 +67,9 @@ class Marks:
         """
         score = np.zeros((frames, bodies))
         still = [
-            _Mark(track, track.rival.since, track.samples.last_frame, track.rival.score)
+            _Mark(track, track.alternative.since, track.samples.last_frame, track.alternative.score)
             for track in tracks
-            if track.rival is not None
+            if track.alternative is not None
         ]
         for mark in (*self._marks, *still):
             if mark.track.body is not None:
@@ -77,19 +77,19 @@ class Marks:
                 np.maximum(part, mark.score, out=part)
         return score
 
-    def note_company(
+    def note_neighbours(
         self, tracks: Sequence[Track], frame: int, exchanges: Sequence[tuple[int, int, float]]
     ) -> None:
         """Note which tracks are so near each other that they could be exchanged; since when."""
-        before = {track: track.company for track in tracks}
+        before = {track: track.neighbours for track in tracks}
         for track in tracks:
-            track.company = {}
+            track.neighbours = {}
         meeting = self._meeting(tracks)
         likely = {(i, j) for i, j, score in exchanges if score >= self._settings.ambiguous_above}
         for one, other in sorted({(i, j) for i, j, _ in exchanges} | meeting):
             first, second = tracks[one], tracks[other]
             since = before[first].get(second, frame)
-            first.company[second] = second.company[first] = since
+            first.neighbours[second] = second.neighbours[first] = since
         for track in tracks:
             if track.measured is None and track.samples.last_frame == frame - 1:
                 track.lost_beside = {}
@@ -100,7 +100,7 @@ class Marks:
         """Note of two that may be taken for each other that they were, when one is lost now."""
         for lost, beside in ((one, other), (other, one)):
             if lost.measured is None and lost.samples.last_frame == frame - 1:
-                lost.lost_beside[beside] = lost.company[beside]
+                lost.lost_beside[beside] = lost.neighbours[beside]
 
     def doubt(self, tracks: Iterable[Track], parted: Sequence[Track], frame: int) -> None:
         """Mark tracks whose assignment was a close thing, or that came back near others."""
@@ -142,11 +142,11 @@ class Marks:
         # What was not seen may have been exchanged at any time since it was.
         last = int(track.samples.frames[-2 if track.measured is not None else -1 :][0])
         beside: Iterable[int] = track.lost_beside.values() if track.measured is not None else ()
-        return min([*track.company.values(), *beside, last])
+        return min([*track.neighbours.values(), *beside, last])
 
 
-class Rivals:
-    """Keeps rivals of tracks, and settles which is right.
+class Alternatives:
+    """Keeps alternatives of tracks, and settles which is right.
 
     Parameters
     ----------
@@ -169,23 +169,34 @@ class Rivals:
         )
 
     def costs(self, tracks: Sequence[Track], measured: Measured, time: float, frame: int) -> Floats:
-        """Return the cost of each pair if the rival were right, its lag included; for `assign`.
+        """Return the cost of each pair if the alternative were right, for `assign`, lag included.
 
         Both are compared with the same: that the track as it is was missed.
         """
         cost = np.full((len(tracks), len(measured.pose)), np.inf)
-        having = [(row, track.rival) for row, track in enumerate(tracks) if track.rival is not None]
+        having = [
+            (row, track.alternative)
+            for row, track in enumerate(tracks)
+            if track.alternative is not None
+        ]
         if having and len(measured.pose):
-            rivals = [rival for _, rival in having]
-            predicted = predicted_of(rivals, time, [True] * len(rivals))
-            lead = np.array([self._lead(tracks[row], rival, frame) for row, rival in having])
+            alternatives = [alternative for _, alternative in having]
+            predicted = predicted_of(alternatives, time, [True] * len(alternatives))
+            lead = np.array(
+                [self._lead(tracks[row], alternative, frame) for row, alternative in having]
+            )
             cost[[row for row, _ in having]] = (
                 edge_costs(predicted, measured, self._settings) + lead[:, None]
             )
         return cost
 
     def settle(
-        self, tracks: Sequence[Track], detection: Integers, own: Floats, rival: Floats, frame: int
+        self,
+        tracks: Sequence[Track],
+        detection: Integers,
+        own: Floats,
+        alternative: Floats,
+        frame: int,
     ) -> None:
         """Settle what can be settled, before the tracks take what was assigned to them.
 
@@ -195,58 +206,63 @@ class Rivals:
             What is followed.
         detection : array, shape (tracks,)
             What each was assigned, -1 for none.
-        own, rival : array, shape (tracks, detections)
-            Costs for the track as it is, and for its rival.
+        own, alternative : array, shape (tracks, detections)
+            Costs for the track as it is, and for its alternative.
         frame : int
             The frame now.
         """
         for row, track in enumerate(tracks):
             taken = int(detection[row])
-            if track.rival is None:
+            if track.alternative is None:
                 cost = float(own[row, taken]) if taken >= 0 else math.inf
             elif taken < 0:
-                self._miss(track, track.rival, frame)
+                self._miss(track, track.alternative, frame)
                 continue
             else:
-                lead = float(rival[row, taken] - own[row, taken])
-                lag = self._lead(track, track.rival, frame)
-                cost = float(own[row, taken] if lead >= 0.0 else rival[row, taken] - lag)
-                self._seen(track, track.rival, lead, frame)
+                lead = float(alternative[row, taken] - own[row, taken])
+                lag = self._lead(track, track.alternative, frame)
+                cost = float(own[row, taken] if lead >= 0.0 else alternative[row, taken] - lag)
+                self._seen(track, track.alternative, lead, frame)
             doubtful = taken >= 0 and cost > -self._beyond_doubt
-            if track.rival is None and doubtful and track.body is not None and track.key is None:
-                track.rival = track.without(frame, -cost)
+            if (
+                track.alternative is None
+                and doubtful
+                and track.body is not None
+                and track.key is None
+            ):
+                track.alternative = track.without(frame, -cost)
 
-    def _lead(self, track: Track, rival: Rival, frame: int) -> float:
+    def _lead(self, track: Track, alternative: Alternative, frame: int) -> float:
         """Return the lead of a track if it is missed now."""
         seen_just_now = track.samples.last_frame == frame - 1
-        return rival.lead + (self._miss_tells if seen_just_now else 0.0)
+        return alternative.lead + (self._miss_tells if seen_just_now else 0.0)
 
-    def _miss(self, track: Track, rival: Rival, frame: int) -> None:
+    def _miss(self, track: Track, alternative: Alternative, frame: int) -> None:
         """Weigh that nothing was seen."""
-        rival.lead = self._lead(track, rival, frame)
-        if rival.lead < 0.0:
-            self._go_back(track, rival)
-        elif rival.time - rival.seen > self._settings.lost_after:
-            self._leave_open(track, rival, frame)
+        alternative.lead = self._lead(track, alternative, frame)
+        if alternative.lead < 0.0:
+            self._go_back(track, alternative)
+        elif alternative.time - alternative.seen > self._settings.lost_after:
+            self._leave_open(track, alternative, frame)
 
-    def _seen(self, track: Track, rival: Rival, lead: float, frame: int) -> None:
-        """Weigh a detection by how much better the track explains it than its rival."""
+    def _seen(self, track: Track, alternative: Alternative, lead: float, frame: int) -> None:
+        """Weigh a detection by how much better the track explains it than its alternative."""
         if lead < 0.0:
-            self._go_back(track, rival)
+            self._go_back(track, alternative)
             if -lead < self._beyond_doubt:
                 self._marks.add(track, track.samples.last_frame, frame, math.exp(lead))
         elif lead >= self._beyond_doubt:
-            track.rival = None
+            track.alternative = None
         else:
-            rival.lead = lead
-            if rival.time - rival.seen > self._settings.lost_after:
-                self._leave_open(track, rival, frame)
+            alternative.lead = lead
+            if alternative.time - alternative.seen > self._settings.lost_after:
+                self._leave_open(track, alternative, frame)
 
-    def _go_back(self, track: Track, rival: Rival) -> None:
-        self._counts["taken_back"] += len(track.samples) - rival.samples
-        track.go_back(rival)
+    def _go_back(self, track: Track, alternative: Alternative) -> None:
+        self._counts["taken_back"] += len(track.samples) - alternative.samples
+        track.go_back(alternative)
 
-    def _leave_open(self, track: Track, rival: Rival, frame: int) -> None:
+    def _leave_open(self, track: Track, alternative: Alternative, frame: int) -> None:
         """Mark what was not settled in the time in which a body is given up."""
-        self._marks.add(track, rival.since, frame, rival.score)
-        track.rival = None
+        self._marks.add(track, alternative.since, frame, alternative.score)
+        track.alternative = None

@@ -20,7 +20,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.schema.check import described
 from driftwalk.track.follow.assign import assign
 from driftwalk.track.follow.kalman import STATES, Measured, edge_costs, predict, start_state, update
-from driftwalk.track.follow.marks import Marks, Rivals
+from driftwalk.track.follow.marks import Alternatives, Marks
 from driftwalk.track.follow.naming import Naming
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracks import (
@@ -77,7 +77,7 @@ class Tracker:
         self._over: list[Track] = []
         self._marks = Marks(settings)
         self._naming = Naming(settings, self._marks)
-        self._rivals = Rivals(settings, self._marks, self.counts)
+        self._alternatives = Alternatives(settings, self._marks, self.counts)
 
     def step(self, time: float, detections: Iterable[Detection]) -> list[TrackState]:
         """Take the detections of the next frame.
@@ -188,8 +188,10 @@ class Tracker:
     def _predict(self, time: float) -> None:
         if not self._tracks:
             return
-        rivals = [track.rival for track in self._tracks if track.rival is not None]
-        both: list[Followed] = [*self._tracks, *rivals]
+        alternatives = [
+            track.alternative for track in self._tracks if track.alternative is not None
+        ]
+        both: list[Followed] = [*self._tracks, *alternatives]
         elapsed = np.array([time - one.time for one in both])
         mean, covariance = predict(*stacked(both), elapsed, self.settings.motion)
         speed = np.hypot(mean[:, 3], mean[:, 4])
@@ -208,21 +210,21 @@ class Tracker:
         missed = [track.samples.last_frame < frame - 1 for track in tracks]
         predicted = predicted_of(tracks, now.time, missed)
         cost = edge_costs(predicted, now.measured, self.settings)
-        rival = self._rivals.costs(tracks, now.measured, now.time, frame)
+        alternative = self._alternatives.costs(tracks, now.measured, now.time, frame)
         _obey_keys(cost, tracks, now.found)
-        _obey_keys(rival, tracks, now.found)
-        chosen = assign(np.minimum(cost, rival))
-        self._rivals.settle(tracks, chosen.detection, cost, rival, frame)
+        _obey_keys(alternative, tracks, now.found)
+        chosen = assign(np.minimum(cost, alternative))
+        self._alternatives.settle(tracks, chosen.detection, cost, alternative, frame)
         pairs = [(track, int(j)) for track, j in zip(tracks, chosen.detection, strict=True)]
         parted = [t for t, j in pairs if j >= 0 and t.samples.last_frame < frame - 1]
         self._update(now, [(t, j) for t, j in pairs if j >= 0])
-        self._marks.note_company(tracks, frame, chosen.exchanges)
+        self._marks.note_neighbours(tracks, frame, chosen.exchanges)
         for track, score in zip(tracks, chosen.score, strict=True):
             track.score = float(score) if track.key is None else 0.0
         self._marks.doubt(tracks, parted, frame)
         for track in tracks:
-            if track.rival is not None:
-                track.score = max(track.score, track.rival.score)
+            if track.alternative is not None:
+                track.score = max(track.score, track.alternative.score)
         return {j for _, j in pairs if j >= 0}
 
     def _update(self, now: _Frame, pairs: Sequence[tuple[Track, int]]) -> None:

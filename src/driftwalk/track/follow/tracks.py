@@ -121,7 +121,7 @@ class Followed:
 
 
 @dataclass(eq=False, kw_only=True)
-class Rival(Followed):
+class Alternative(Followed):
     """State of a track without its last measurements."""
 
     samples: int
@@ -152,23 +152,23 @@ class Track(Followed):
     """Score of the last assignment that was in doubt, 0 to 1."""
     settles_in: int = 0
     """Measurements after which an assignment that was in doubt has settled."""
-    company: dict[Track, int] = field(default_factory=dict)
+    neighbours: dict[Track, int] = field(default_factory=dict)
     """Tracks that are near now, each with the frame since when."""
-    rival: Rival | None = None
+    alternative: Alternative | None = None
     """State before a measurement that is in doubt."""
 
-    def without(self, frame: int, lead: float) -> Rival:
+    def without(self, frame: int, lead: float) -> Alternative:
         """Return the track as it is before it takes a measurement."""
         state: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(Followed)}
         state["lost_beside"] = dict(self.lost_beside)
-        return Rival(**state, samples=len(self.samples), since=frame, lead=max(lead, 0.0))
+        return Alternative(**state, samples=len(self.samples), since=frame, lead=max(lead, 0.0))
 
-    def go_back(self, rival: Rival) -> None:
+    def go_back(self, alternative: Alternative) -> None:
         """Make the track what it was before the measurements in doubt."""
         for one in fields(Followed):
-            setattr(self, one.name, getattr(rival, one.name))
-        self.samples.keep_first(rival.samples)
-        self.rival = None
+            setattr(self, one.name, getattr(alternative, one.name))
+        self.samples.keep_first(alternative.samples)
+        self.alternative = None
 
 
 def stacked(bodies: Sequence[Followed]) -> tuple[Floats, Floats]:

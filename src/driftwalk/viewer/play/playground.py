@@ -186,7 +186,7 @@ class Stream(Protocol):
     """Receiver of the lines of a tracker's stream; `driftwalk.track.LiveServer` is one."""
 
     def publish(self, content: Any) -> None:
-        """Send a line to whoever is connected."""
+        """Send a line to all connected pages."""
 
 
 class PlaySource(Playground):
@@ -276,11 +276,11 @@ class PlaySource(Playground):
         self._watched.set()
 
     def watched(self, browsers: int) -> None:
-        """Let the tank rest while nobody sees it."""
+        """Let the tank rest while no page is connected."""
         super().watched(1 if self._stream is not None else browsers)
 
     def _change(self, name: str, value: Any) -> None:
-        # Without latching nothing would hold together: whoever turns it off wants to see that.
+        # Without latching nothing would hold together: a user who turns it off wants to see that.
         self.tank.set(**{name: value}, part=name == "latching" and value == "none")
         self.motion.clear()
 

@@ -101,7 +101,7 @@ class Playground(Source):
         raise NotImplementedError
 
     def watched(self, browsers: int) -> None:
-        """Let the world rest while nobody sees it."""
+        """Let the world rest while no page is connected."""
         if browsers:
             self._watched.set()
         else:
@@ -112,7 +112,7 @@ class Playground(Source):
         return [{"type": "page", "page": self._page()}, self._picture]
 
     async def run(self, publish: Publish) -> None:
-        """Advance the tank in a thread of its own, and compare its motion in another."""
+        """Advance the tank in a separate thread, and compare its motion in another."""
         loop = asyncio.get_running_loop()
         # What has been loaded up to now stays: looking through it again would stop the tank for
         # three pictures each time.
@@ -197,7 +197,7 @@ class Playground(Source):
                 # Not while a knob is turned: it would be turned back under the user's hand.
                 self._settled = math.inf
                 publish({"type": "section", "section": self._controls()})
-            # Whoever comes gets this one: only this thread can look at the tank between two steps.
+            # A new client gets this one: only this thread can look at the tank between two steps.
             self._picture = self._tank_message()
             publish(self._picture)
             self._shown(began)

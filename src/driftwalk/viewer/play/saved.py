@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import face_table
-from driftwalk.assembly.outcomes.outcome_classes import CONTACT_POLICY
+from driftwalk.assembly.outcomes.outcome_classes import BODY_CONTACT
 from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.assembly.runs.plan import Plan, make_plan, whole_steps
 from driftwalk.comparison.significance import steps_memory_time, usual_block_length
@@ -101,7 +101,7 @@ def local_tank(source: PlaySource) -> dict[str, Any]:
         "chirality": study.assembly.chirality,
         "shape": study.block.shape,
         "width": study.block.width_m,
-        "contact_gap": CONTACT_POLICY.gap,
+        "contact_gap": BODY_CONTACT.gap,
         "most_named": MOST_NAMED,
         "run_steps": whole_steps(study),
         "motion": _motion(source),

@@ -10,7 +10,7 @@ from typing import Any, Final
 from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
 from driftwalk.core.files.shards import read_specification
-from driftwalk.core.progress import tell_nobody
+from driftwalk.core.progress import ignore_progress
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.text_files import path_inside, text_of_name
 from driftwalk.page.html import page_frame
@@ -96,7 +96,9 @@ class RunSource(Source):
 
     view = "run"
 
-    def __init__(self, folder: str | Path, *, tell: Callable[[str], None] = tell_nobody) -> None:
+    def __init__(
+        self, folder: str | Path, *, tell: Callable[[str], None] = ignore_progress
+    ) -> None:
         self._folder = Path(folder)
         self._tell = tell
         require_run(self._folder)

@@ -97,7 +97,8 @@ def test_the_form_is_that_of_the_summaries(form: str, count: int):
 
 @pytest.mark.false_alarm(1e-4)
 def test_two_places_compare_by_their_likelihood(fresh_seed: Callable[[int], int]):
-    """Misfit and logarithm of the determinant are -2 log of a normal density, but for a constant.
+    """Discrepancy and logarithm of the determinant are -2 log of a normal density, but for a
+    constant.
 
     The determinant of a covariance from 4096 simulations has a relative error of sqrt(16 / 4096).
     """
@@ -115,8 +116,9 @@ def test_the_misfit_at_the_truth_is_that_of_the_known_noise(
     """Normal noise with covariance S, whitened by A: mean tr(A S), variance 2 tr(A S A S).
 
     A is the inverse of S with a part of its correlations taken away; without correlations the
-    misfit is chi-square with 8 degrees of freedom. 4000 draws give the mean within 4 errors and
-    the variance within 15 % (its own error is 3.5 %); 4096 simulations add less than 1 % to each.
+    discrepancy is chi-square with 8 degrees of freedom. 4000 draws give the mean within 4 errors
+    and the variance within 15 % (its own error is 3.5 %); 4096 simulations add less than 1 % to
+    each.
     """
     model, sample = Quadratic(fresh_seed(3), related=related), 4000
     emulator = model.emulator(4096)
@@ -141,7 +143,7 @@ def test_a_solution_is_as_near_the_truth_as_it_says(fresh_seed: Callable[[int], 
 
     90 % lie within 1.645 of their standard deviations: 600 such cases, which share an emulator but
     not their noise, have a share within 0.84 and 0.96, 4.5 and more binomial errors on either side.
-    The misfit left is chi-square with 8 - 2 degrees of freedom; its mean has an error of 0.2.
+    The discrepancy left is chi-square with 8 - 2 degrees of freedom; its mean has an error of 0.2.
     """
     model, recordings = Quadratic(fresh_seed(4), related=False), 300
     emulator = model.emulator(4096)

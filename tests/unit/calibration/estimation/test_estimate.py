@@ -80,7 +80,7 @@ def deviations() -> np.ndarray:
 
 @pytest.mark.slow
 def test_a_recording_of_the_model_is_matched_by_its_summaries_alone():
-    """The search is not asked for; intervals are those of the model, and so are the misfits.
+    """The search is not asked for; intervals are those of the model, and so are the discrepancies.
 
     Six summaries less two parameters leave a chi-square with 4 degrees of freedom; the median of
     200 such numbers has an error of 0.24, their 95 % quantile one of 0.8.
@@ -88,39 +88,46 @@ def test_a_recording_of_the_model_is_matched_by_its_summaries_alone():
     starts = Starts()
     found = matched(Toy(bent, 1), starts, replicates=200)
     assert starts.calls == 0
-    assert found.misfit.usual
-    assert not found.unlike
+    assert found.discrepancy.usual
+    assert not found.undetermined
     assert found.stretch == 1.0
     std = deviations()
     assert (np.abs(found.point - TRUTH) < 0.6 * std).all()
     assert (np.abs(found.even_point - EVEN) < 0.6 * std).all()
     np.testing.assert_allclose(found.sample.std(axis=0), std, rtol=0.25)
-    assert found.misfit.median == pytest.approx(chi2(4).median(), abs=1.1)
-    assert found.misfit.upper == pytest.approx(chi2(4).ppf(0.95), abs=4.0)
-    assert found.misfit.value < MATCHING.matches * SPREAD.size
+    assert found.discrepancy.median == pytest.approx(chi2(4).median(), abs=1.1)
+    assert found.discrepancy.upper == pytest.approx(chi2(4).ppf(0.95), abs=4.0)
+    assert found.discrepancy.value < MATCHING.matches * SPREAD.size
 
 
 @pytest.mark.slow
 def test_what_the_model_cannot_give_widens_the_draws():
-    """One summary is ten deviations off: draws are spread as the misfit is above its usual one."""
+    """One summary is ten deviations off: draws are spread as the discrepancy is above its usual
+    one."""
     starts = Starts((0.4, 0.6), (0.41, 0.6), (0.9, 0.9))
     found = matched(Toy(bent, 2, off=10.0), starts)
     assert starts.calls == 1
-    assert not found.misfit.usual
-    assert MATCHING.matches * SPREAD.size < found.misfit.value < MATCHING.hopeless * SPREAD.size
-    assert found.stretch == pytest.approx(np.sqrt(found.misfit.value / found.misfit.median))
+    assert not found.discrepancy.usual
+    assert (
+        MATCHING.matches * SPREAD.size
+        < found.discrepancy.value
+        < MATCHING.no_restart_above * SPREAD.size
+    )
+    assert found.stretch == pytest.approx(
+        np.sqrt(found.discrepancy.value / found.discrepancy.median)
+    )
     assert found.stretch > 2.0
-    assert found.unlike
+    assert found.undetermined
     np.testing.assert_allclose(found.sample.std(axis=0), found.stretch * deviations(), rtol=0.35)
     np.testing.assert_allclose(found.point, np.median(found.sample, axis=0), atol=1e-9)
 
 
 @pytest.mark.slow
 def test_a_small_misfit_leaves_parameters_determined():
-    """One summary is three deviations off, 9 of misfit beside the usual 3.4 of 4 degrees."""
+    """One summary is three deviations off, 9 of discrepancy beside the usual 3.4 of 4 degrees."""
     found = matched(Toy(bent, 2, off=3.0), Starts((0.4, 0.6)), replicates=200)
-    assert 1.0 < found.misfit.value / found.misfit.median < 4.0
-    assert not found.unlike
+    assert 1.0 < found.discrepancy.value / found.discrepancy.median < 4.0
+    assert not found.undetermined
 
 
 @pytest.mark.slow
@@ -128,8 +135,8 @@ def test_another_start_is_no_use_for_another_model():
     starts = Starts((0.4, 0.6))
     found = matched(Toy(bent, 3, off=300.0), starts)
     assert starts.calls == 0
-    assert found.misfit.value > MATCHING.hopeless * SPREAD.size
-    assert not found.misfit.usual
+    assert found.discrepancy.value > MATCHING.no_restart_above * SPREAD.size
+    assert not found.discrepancy.usual
     assert ((found.sample >= 0.0) & (found.sample <= 1.0)).all()
 
 
@@ -139,7 +146,7 @@ def test_a_regression_with_large_errors_is_a_start_all_the_same():
     starts = Starts((0.9, 0.1))
     found = matched(Toy(waves(3.0), 4), starts)
     assert starts.calls == 0
-    assert found.misfit.usual
+    assert found.discrepancy.usual
     np.testing.assert_allclose(found.point, TRUTH, atol=0.01)
 
 
@@ -149,7 +156,7 @@ def test_where_summaries_find_no_neighbourhood_the_search_does():
     starts = Starts((0.9, 0.1), (0.91, 0.11), (0.42, 0.58))
     found = matched(Toy(waves(5.0), 4), starts)
     assert starts.calls == 1
-    assert found.misfit.usual
+    assert found.discrepancy.usual
     np.testing.assert_allclose(found.point, TRUTH, atol=0.01)
 
 

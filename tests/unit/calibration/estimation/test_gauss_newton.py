@@ -1,4 +1,5 @@
-"""From a start to the setting of least misfit, where the truth and the valley to it are known."""
+"""From a start to the setting of least discrepancy, where the truth and the valley to it are
+known."""
 
 from __future__ import annotations
 

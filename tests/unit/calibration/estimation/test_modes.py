@@ -65,7 +65,8 @@ def share_above(steep: float) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("steep", [0.0, 0.15])
 def test_both_places_have_their_shares(steep: float):
-    """The misfits of covariances from simulations have errors of 0.1: 0.05 of a share, at most."""
+    """The discrepancies of covariances from simulations have errors of 0.1: 0.05 of a share, at
+    most."""
     modes, _ = found_from((0.71, 0.41), (0.29, 0.39), steep=steep)
     assert len(modes.places) == 2
     first_is_below = modes.places[0].sample[:, 0].mean() < 0.5
@@ -84,7 +85,7 @@ def test_a_parameter_is_apart_where_its_places_are():
 
 @pytest.mark.slow
 def test_a_place_that_the_recording_rules_out_is_left_out():
-    """A slope of 1.25 puts the other place 10 deviations off: 100 of misfit."""
+    """A slope of 1.25 puts the other place 10 deviations off: 100 of discrepancy."""
     modes, sampled = found_from((0.29, 0.39), (0.71, 0.41), steep=1.25)
     assert sampled == [0, 1]
     assert len(modes.places) == 1

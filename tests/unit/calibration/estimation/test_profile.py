@@ -1,4 +1,4 @@
-"""Profiles of a misfit that is a quadratic form: they are parabolas known in closed form."""
+"""Profiles of a discrepancy that is a quadratic form: they are parabolas known in closed form."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_profiles_are_parabolas_of_the_standard_error():
     assert found.place.shape == found.rise.shape == (2, 21)
     np.testing.assert_allclose(found.place[:, -1] - solution.setting, 3.0 * std, rtol=1e-9)
     steps = (found.place - solution.setting[:, None]) / std[:, None]
-    # The solver stops within 1e-8 of the misfit, and a held value may move by 1e-9 of the box.
+    # The solver stops within 1e-8 of the discrepancy, and a held value may move by 1e-9 of the box.
     np.testing.assert_allclose(found.rise, steps**2, atol=1e-5)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import gammainc
 
-from driftwalk.calibration.estimation.posterior import REGION, Region, region_about
+from driftwalk.calibration.estimation.posterior import SIMULATED_REGION, Region, region_about
 from driftwalk.calibration.evolution import rounded
 
 ROOT = np.array([[0.02, 0.0, 0.0], [0.015, 0.01, 0.0], [-0.01, 0.004, 0.005]])
@@ -21,7 +21,7 @@ def test_settings_fill_the_ball_evenly():
     region = Region(MIDDLE, ROOT)
     settings = region.filled(4096, 1)
     np.testing.assert_array_equal(settings, rounded(settings))
-    wanted = REGION.spread**2 * ROOT @ ROOT.T
+    wanted = SIMULATED_REGION.spread**2 * ROOT @ ROOT.T
     np.testing.assert_allclose(np.cov(settings.T), wanted, atol=0.03 * wanted.max())
     apart = region.distances(settings)
     assert apart.max() < 1.001
@@ -46,14 +46,14 @@ def test_settings_beyond_an_end_are_mirrored_into_the_cube():
     assert settings.max() <= 1.0
     # Half of the ball lies beyond, and none of it is heaped up at the end.
     assert np.mean(settings[:, 0] == 0.0) < 0.01
-    assert settings[:, 0].mean() == pytest.approx(REGION.spread * 0.02 * 0.8, rel=0.15)
+    assert settings[:, 0].mean() == pytest.approx(SIMULATED_REGION.spread * 0.02 * 0.8, rel=0.15)
 
 
 def test_a_region_has_the_mean_and_the_axes_of_the_draws():
     sample = MIDDLE + np.random.default_rng(4).normal(size=(5000, 3)) @ ROOT.T
     region = region_about(sample)
     np.testing.assert_allclose(region.centre, sample.mean(axis=0), atol=1e-6)
-    wanted = np.cov(sample.T) + REGION.narrowest**2 * np.eye(3)
+    wanted = np.cov(sample.T) + SIMULATED_REGION.narrowest**2 * np.eye(3)
     np.testing.assert_allclose(region.root @ region.root.T, wanted, rtol=1e-9)
     np.testing.assert_allclose(region.std, np.sqrt(np.diag(wanted)))
 
@@ -63,9 +63,9 @@ def test_it_is_no_wider_than_a_part_of_the_ranges():
     sample = np.random.default_rng(6).uniform(size=(5000, 3))
     sample[:, 2] = 0.5 + 0.01 * (sample[:, 1] - 0.5)
     region = region_about(sample)
-    np.testing.assert_allclose(region.width[:2], REGION.widest)
-    assert region.width[2] < 0.1 * REGION.widest
+    np.testing.assert_allclose(region.width[:2], SIMULATED_REGION.widest)
+    assert region.width[2] < 0.1 * SIMULATED_REGION.widest
     covariance = region.root @ region.root.T
     found = covariance[1, 2] / np.sqrt(covariance[1, 1] * covariance[2, 2])
     small = 0.01 * np.sqrt(1 / 12)
-    assert found == pytest.approx(small / np.hypot(small, REGION.narrowest), abs=0.02)
+    assert found == pytest.approx(small / np.hypot(small, SIMULATED_REGION.narrowest), abs=0.02)

@@ -63,7 +63,7 @@ def calibrated(recording: xr.Dataset, model: str = "active", **options: Any) -> 
 @pytest.mark.usefixtures("few")
 def test_neither_threads_nor_repetition_change_anything(recording: xr.Dataset) -> None:
     first = calibrated(recording)
-    assert "draws" in first
+    assert "posterior_sample" in first
     xr.testing.assert_identical(first, calibrated(recording, threads=2))
 
 
@@ -113,7 +113,7 @@ def test_without_a_bootstrap_there_is_one_stage(recording: xr.Dataset) -> None:
     assert np.isnan(found["interval"]).all()
     assert np.isnan(found["half_width"]).all()
     assert not found["determined"].any()
-    assert "draws" not in found
+    assert "posterior_sample" not in found
     np.testing.assert_array_equal(found["estimate"], found["searched_estimate"])
 
 
@@ -153,7 +153,7 @@ def test_summaries_like_the_models_own_count_however_close_a_search_comes(
     found = calibrated(recording, tell=lambda stage, _done, _most: told.append(stage))
     assert "search" in told
     assert "longer-search" not in told
-    assert float(found["misfit"]) <= float(found["most_misfit"])
+    assert float(found["discrepancy"]) <= float(found["discrepancy_q95"])
     assert found.attrs["estimate_from"] == "summaries"
     assert bool(found.sel(parameter="speed")["determined"])
 
@@ -166,18 +166,20 @@ def test_another_model_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[str] = []
     found = calibrated(resting, "inertial", tell=lambda stage, _done, _most: told.append(stage))
     assert "search" in told
-    assert float(found["misfit"]) > 3 * float(found["most_misfit"])
+    assert float(found["discrepancy"]) > 3 * float(found["discrepancy_q95"])
     warnings = " ".join(found["warning"].values.tolist())
-    assert float(found["misfit"]) > MATCHING.unlike * float(found["usual_misfit"])
+    assert float(found["discrepancy"]) > MATCHING.undetermined_above * float(
+        found["discrepancy_median"]
+    )
     assert not found["determined"].any()
     if found.attrs["estimate_from"] == "search":
-        assert "the summaries of the motion pull the model away" in warnings
+        assert "the summaries of the motion lead to a worse fit" in warnings
     else:
         assert float(found["matched_score"]) <= MATCHING.as_close * float(found["searched_score"])
         assert float(found["interval_stretch"]) > 2.0
         assert "nothing is determined" in warnings
     assert any(
-        text.startswith("summaries of the motion: a misfit of ")
+        text.startswith("summaries of the motion: discrepancy ")
         for text in found["verdict_reason"].values
     )
     assert found["verdict"] == "does not explain"

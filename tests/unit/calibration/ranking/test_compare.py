@@ -252,7 +252,7 @@ def test_summaries_are_matched_and_kept(recorded: xr.Dataset) -> None:
     found = with_summaries(recorded, stores=stores, tell=lambda *all_of: said.append(all_of))
     check_dataset(found)
     assert found["asked"].values.tolist() == (~found["baseline"].values.astype(bool)).tolist()
-    assert (np.isfinite(found["misfit"].values) == found["asked"].values).all()
+    assert (np.isfinite(found["discrepancy"].values) == found["asked"].values).all()
     done, most = np.array([one[:2] for one in said]).T
     assert (np.diff(done) >= 0).all()
     assert len(set(most)) == 1

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from driftwalk.calibration.held_out.law_findings import Misfit
+from driftwalk.calibration.held_out.law_findings import Discrepancy
 from driftwalk.calibration.problem import in_memory
 from driftwalk.calibration.ranking import compare
 from driftwalk.calibration.ranking.compare import Stages
@@ -33,7 +33,7 @@ def test_others_than_those_that_tie_are_asked_until_one_gives_the_summaries(
     order, numbers = ((3, 0, 2), [5] * 4) if wanted[0] == 3 else ((1, 0, 2), [7, 6, 5, 5])
 
     def answer(entry: int, *_: Any, **__: Any) -> Evidence:
-        return Evidence(Misfit(100.0 if entry in giving else 500.0, 90.0, 140.0), 0.0)
+        return Evidence(Discrepancy(100.0 if entry in giving else 500.0, 90.0, 140.0), 0.0)
 
     monkeypatch.setattr(compare, "shortlist_models", lambda *_: Shortlist(order, tied))
     monkeypatch.setattr(compare, "most_settings", lambda *_: 4)
@@ -43,7 +43,7 @@ def test_others_than_those_that_tie_are_asked_until_one_gives_the_summaries(
     judged: Any = [SimpleNamespace(point=np.zeros(1))] * 4
     made = Stages(work, 20, in_memory, None, lambda *_: None)
     assert list(made.evidence(judged)) == wanted
-    # With fewer than two recordings that could judge a misfit nobody is asked.
+    # With fewer than two recordings that could judge a discrepancy nobody is asked.
     assert Stages(work, 0, in_memory, None, lambda *_: None).evidence(judged) == {}
 
 
@@ -56,8 +56,10 @@ def test_a_walk_that_the_distances_do_not_reject_is_asked_where_a_model_gives_th
     work: Any = SimpleNamespace(entries=entries, motion=None, costs=lambda: [1] * 3)
     rejected: Any = {0: [], 1: [], 2: ["place near the wall"]}
     judged: Any = [SimpleNamespace(point=np.zeros(0), number=number) for number in range(3)]
-    misfit = 100.0 if reproduced else 500.0
+    discrepancy = 100.0 if reproduced else 500.0
     monkeypatch.setattr(compare, "shortlist_models", lambda *_: Shortlist((0,), 1))
     monkeypatch.setattr(compare, "held_out_differences", lambda one, _: rejected[one.number])
-    monkeypatch.setattr(Stages, "_matched", lambda *_: Evidence(Misfit(misfit, 90.0, 140.0), 0.0))
+    monkeypatch.setattr(
+        Stages, "_matched", lambda *_: Evidence(Discrepancy(discrepancy, 90.0, 140.0), 0.0)
+    )
     assert list(Stages(work, 20, in_memory, None, lambda *_: None).evidence(judged)) == wanted

@@ -10,7 +10,7 @@ import pytest
 
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore, without_error
-from driftwalk.calibration.held_out.law_findings import Misfit
+from driftwalk.calibration.held_out.law_findings import Discrepancy
 from driftwalk.calibration.ranking.model_evidence import (
     EVIDENCE,
     Evidence,
@@ -80,7 +80,7 @@ def test_a_walk_is_never_named() -> None:
 
 
 def said(discrepancy: float, deviance: float) -> Evidence:
-    return Evidence(Misfit(discrepancy, 100.0, 140.0), deviance)
+    return Evidence(Discrepancy(discrepancy, 100.0, 140.0), deviance)
 
 
 ENTRIES = [entry(9), entry(3), entry(12)]
@@ -94,14 +94,14 @@ def test_a_model_that_gives_the_summaries_is_named_before_a_likelier_that_does_n
 
 def test_of_those_that_give_them_the_likeliest_is_named() -> None:
     found = rank_by_evidence(
-        ENTRIES, {k: said(120.0, -400.0 - 2 * EVIDENCE.rival * k) for k in range(3)}
+        ENTRIES, {k: said(120.0, -400.0 - 2 * EVIDENCE.not_rejected_within * k) for k in range(3)}
     )
     assert found == EvidenceRanking(2, ())
 
 
 def test_of_those_that_are_not_told_apart_the_one_with_the_fewest_numbers_is_named() -> None:
     found = rank_by_evidence(
-        ENTRIES, {k: said(120.0, -400.0 - 0.4 * EVIDENCE.rival * k) for k in range(3)}
+        ENTRIES, {k: said(120.0, -400.0 - 0.4 * EVIDENCE.not_rejected_within * k) for k in range(3)}
     )
     assert found == EvidenceRanking(1, (0, 2))
 
@@ -117,12 +117,12 @@ def test_the_sentence_says_whom_and_why() -> None:
     names = ["nine", "three", "twelve"]
     all_of = {0: said(812.4, 0.0), 1: said(101.0, -400.0), 2: said(99.0, -401.0)}
     assert ranking_sentence(names, all_of, rank_by_evidence(ENTRIES, all_of)) == (
-        "three is named by the summaries of the motion: a misfit of 101, that of its own "
-        "recordings is below 140; no clear difference from twelve, with as many numbers or more; "
-        "less likely are nine 812"
+        "three is named by the summaries of the motion: discrepancy 101, in its own recordings "
+        "below 140; no clear difference from twelve, with as many numbers or more; less likely are "
+        "nine 812"
     )
     none = {0: said(812.4, 0.0), 1: said(211.0, -400.0)}
     assert ranking_sentence(names, none, rank_by_evidence(ENTRIES, none)) == (
-        "No model reproduces the summaries of the motion: the misfits are nine 812, three 211, "
-        "those of the models' own recordings below 140"
+        "No model reproduces the summaries of the motion: the discrepancies are nine 812, three "
+        "211, in the models' own recordings below 140"
     )

@@ -11,7 +11,7 @@ import pytest
 from driftwalk.calibration.held_out import law_findings
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore
-from driftwalk.calibration.held_out.law_findings import BoutDistance, Misfit
+from driftwalk.calibration.held_out.law_findings import BoutDistance, Discrepancy
 from driftwalk.calibration.held_out.recorded import CHECKS
 from driftwalk.calibration.held_out.wall_clearance import Clearance
 from driftwalk.calibration.ranking.model_evidence import Evidence, rank_by_evidence
@@ -21,7 +21,7 @@ from driftwalk.schema.answers.verdict import CANNOT_TELL, DOES_NOT_EXPLAIN, EXPL
 
 NAMES = ("steps", "steps_3", "steps_9", "frame", "wall", "memory")
 WALL = NAMES.index("wall")
-TYPICAL = Evidence(Misfit(80.0, 75.0, 110.0), -400.0)
+TYPICAL = Evidence(Discrepancy(80.0, 75.0, 110.0), -400.0)
 
 
 def motion(**changes: Any) -> Any:
@@ -85,16 +85,20 @@ def test_a_model_that_passes_every_test_explains() -> None:
 
 def test_a_misfit_beyond_its_own_limit_is_against_a_model_even_where_all_miss() -> None:
     """A walk of power-law runs had 388 against 112 and was called explained."""
-    (found,) = verdicts_of(["run_tumble"], {0: TYPICAL._replace(misfit=Misfit(388.0, 75.0, 110.0))})
+    (found,) = verdicts_of(
+        ["run_tumble"], {0: TYPICAL._replace(discrepancy=Discrepancy(388.0, 75.0, 110.0))}
+    )
     assert found.word == DOES_NOT_EXPLAIN
-    assert "a misfit of 388, that of the model's own recordings is below 110" in found.reasons[0]
+    assert "discrepancy 388, in the model's own recordings below 110" in found.reasons[0]
 
 
 def test_a_misfit_just_beyond_its_limit_leaves_the_answer_open() -> None:
     """One recording of the true law in twenty has it, and so have some of a law that is near."""
-    (found,) = verdicts_of(["run_tumble"], {0: TYPICAL._replace(misfit=Misfit(130.0, 75.0, 110.0))})
+    (found,) = verdicts_of(
+        ["run_tumble"], {0: TYPICAL._replace(discrepancy=Discrepancy(130.0, 75.0, 110.0))}
+    )
     assert found.word == CANNOT_TELL
-    assert "a misfit of 130" in found.reasons[0]
+    assert "discrepancy 130" in found.reasons[0]
 
 
 def test_a_motion_that_is_not_steady_leaves_it_open(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,7 +108,7 @@ def test_a_motion_that_is_not_steady_leaves_it_open(monkeypatch: pytest.MonkeyPa
 
 def test_errors_of_the_flow_are_no_misfit_of_a_model_that_needs_one() -> None:
     """The block in a flow that was extracted from its own recording had 4305 against 140."""
-    evidence = {0: TYPICAL._replace(misfit=Misfit(4305.0, 75.0, 110.0))}
+    evidence = {0: TYPICAL._replace(discrepancy=Discrepancy(4305.0, 75.0, 110.0))}
     (found,) = verdicts_of(["active+flow"], evidence)
     assert found.word == CANNOT_TELL
     assert "errors of the flow may do that" in found.reasons[0]
@@ -131,14 +135,14 @@ def test_without_the_summaries_nothing_is_explained() -> None:
 
 
 @pytest.mark.parametrize(
-    ("misfit", "held", "word"),
+    ("discrepancy", "held", "word"),
     [(80.0, 0.12, CANNOT_TELL), (300.0, 0.12, EXPLAINS), (80.0, 0.25, EXPLAINS)],
 )
 def test_tests_that_a_walk_of_recorded_steps_passes_have_no_power(
-    misfit: float, held: float, word: str
+    discrepancy: float, held: float, word: str
 ) -> None:
     names = ["active", "resampled steps"]
-    evidence = {0: TYPICAL, 1: TYPICAL._replace(misfit=Misfit(misfit, 75.0, 110.0))}
+    evidence = {0: TYPICAL, 1: TYPICAL._replace(discrepancy=Discrepancy(discrepancy, 75.0, 110.0))}
     model, walk = verdicts_of(names, evidence, scores=[scored(), scored(held=held)])
     assert model.word == word
     assert walk.word == DOES_NOT_EXPLAIN
@@ -202,11 +206,11 @@ def test_of_models_that_are_as_likely_none_is_rejected_for_its_distance() -> Non
 
 def test_a_model_with_more_numbers_that_is_no_likelier_than_one_that_fails_is_left_open() -> None:
     """Two bodies that turn off before the wall were explained by two states: it fits more."""
-    unusual = Misfit(130.0, 75.0, 110.0)
-    evidence = {0: TYPICAL._replace(misfit=unusual), 1: TYPICAL._replace(deviance=-405.0)}
+    unusual = Discrepancy(130.0, 75.0, 110.0)
+    evidence = {0: TYPICAL._replace(discrepancy=unusual), 1: TYPICAL._replace(deviance=-405.0)}
     for word, simpler in (
         (CANNOT_TELL, evidence[0]),
-        (EXPLAINS, TYPICAL._replace(deviance=-300.0, misfit=unusual)),
+        (EXPLAINS, TYPICAL._replace(deviance=-300.0, discrepancy=unusual)),
     ):
         simple, found = verdicts_of(["run_rest", "two_state"], evidence | {0: simpler})
         assert not simple.explains

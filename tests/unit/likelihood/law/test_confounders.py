@@ -47,7 +47,7 @@ def objection(alone: Mode | None, *, left_out: float = 0.6, flows: int = 2) -> s
     return tried.objections(mode((2.47, 0.02)), ["drag_power"]).get("drag_power", "")
 
 
-def test_a_power_that_the_contacts_feign_is_not_opened() -> None:
+def test_a_power_that_the_contacts_imitate_is_not_opened() -> None:
     """Without them it is 2 within its error; or other than it was; or not to be had."""
     assert "2.47 ± 0.02 was not opened: in the 40 % of the intervals" in objection(
         mode((2.05, 0.05))
@@ -94,8 +94,8 @@ def test_the_intervals_hold_those_of_a_rival(monkeypatch: pytest.MonkeyPatch) ->
     theirs = {"drag_coefficient": 0.6, "drag_coefficient_interval": [0.4, 0.9]}
     monkeypatch.setattr(fitting, "_parameter_facts", lambda *_: theirs)
     monkeypatch.setattr(fitting, "restricted_drag", lambda *_: None)
-    rival: Any = None
-    assert fitting._with_rival(ours, rival, rival, rival) == {
+    alternative: Any = None
+    assert fitting._with_alternative(ours, alternative, alternative, alternative) == {
         "drag_coefficient": 0.4,
         "drag_coefficient_interval": [0.3, 0.9],
     }

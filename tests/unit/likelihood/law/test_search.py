@@ -192,9 +192,9 @@ def test_without_orientations_a_floating_body_needs_more_evidence(
     laws.assumptions = SimpleNamespace(pressure_gradient="auto")  # type: ignore[assignment]
     monkeypatch.setattr(LawSearch, "_other_law", lambda *_: other)
     found = LawResult(mode, mode, floating, {}, settled_by, None)
-    law = laws._with_rival(found, cast("Point", None))
+    law = laws._with_alternative(found, cast("Point", None))
     assert bool(law.unsettled) is unsettled
-    assert law.rivals == ((other,) if unsettled else ())
+    assert law.alternatives == ((other,) if unsettled else ())
 
 
 @pytest.mark.slow
@@ -225,7 +225,7 @@ def test_the_model_itself_opens_nothing() -> None:
     fit = dw.fit_motion(recording(SECONDS), study_with())
     assert fit.attrs["force_law"] == "paper"
     assert not fit["number_opened"].values.any()
-    assert not [text for text in map(str, fit["warning"].values) if "may feign" in text]
+    assert not [text for text in map(str, fit["warning"].values) if "can imitate" in text]
     assert list(fit["law"].values) == ["paper"]
     assert {"linear_share", "force_memory", "marker_x"} <= set(fit["departure"].values)
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from driftwalk.core.errors import InputError
-from driftwalk.record import describe, load, vocabulary
+from driftwalk.record import describe, load, unit_and_column_words
 from driftwalk.schema import body_names, body_track
 
 FILES = Path(__file__).parents[3] / "data" / "foreign"
@@ -461,7 +461,7 @@ def test_centre_and_head_are_one_body(tmp_path: Path, head: str) -> None:
 
 @pytest.mark.parametrize("table", ["quantities", "units", "sides_of_a_box"])
 def test_a_word_has_one_meaning(table: str) -> None:
-    text = (Path(vocabulary.__file__).with_suffix(".toml")).read_text(encoding="utf-8")
+    text = (Path(unit_and_column_words.__file__).with_suffix(".toml")).read_text(encoding="utf-8")
     found = [word for words in tomllib.loads(text)[table].values() for word in words.split()]
     assert found == [word.lower() for word in found]
     assert [word for word, times in Counter(found).items() if times > 1] == []

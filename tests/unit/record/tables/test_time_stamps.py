@@ -11,7 +11,7 @@ import pytest
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record import describe, load
-from driftwalk.record.tables.stamps import NO_TIME, StampReader
+from driftwalk.record.tables.date_stamps import NO_TIME, StampReader
 from driftwalk.schema import body_track
 
 

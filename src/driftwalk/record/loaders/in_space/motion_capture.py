@@ -18,7 +18,7 @@ from driftwalk.record.raw import ANGLE_UNITS, LENGTH_UNITS, RawRecording, ReadOp
 from driftwalk.record.space import MATRIX, QUATERNION, VECTOR, SpaceColumns, read_in_space
 from driftwalk.record.tables.text_source import first_lines
 from driftwalk.record.text import header_rows
-from driftwalk.record.vocabulary import UNITS
+from driftwalk.record.unit_and_column_words import UNITS
 
 Rows = Sequence[Sequence[str]]
 """Rows of titles, all as long as the table is wide; the last names axes."""

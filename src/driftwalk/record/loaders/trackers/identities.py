@@ -265,8 +265,8 @@ CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")
 POSE: Final = tuple(f"pose{at}" for at in range(100))
 """Points of the posture, as TRex numbers them; more than it writes."""
 ASSUMED: Final = (
-    "the file does not hold cm_per_pixel, and TRex takes the image to be 30 cm wide where nobody "
-    "set it: check the scale"
+    "the file does not hold cm_per_pixel, and TRex takes the image to be 30 cm wide where no scale "
+    "was set: check the scale"
 )
 _USED: Final = re.compile(r"frame|time|missing|ANGLE|[XY](#[wp]?centroid)?|pose[XY]\d+")
 _INDIVIDUAL: Final = re.compile(r"(.*?)_?(?:fish|id)?(\d+)\.(?:npz|csv)")

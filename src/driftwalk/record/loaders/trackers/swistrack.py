@@ -73,7 +73,7 @@ class SwisTrackTracksLoader:
 
 
 def _in_world(places: Sequence[Array], options: ReadOptions) -> bool:
-    """Whether the run was calibrated, and nobody asks for the image."""
+    """Whether the run was calibrated, and the image is not asked for."""
     return options.metres_per_pixel is None and any(one.any() for one in places)
 
 
@@ -111,7 +111,7 @@ def _columns(head: bytes) -> list[str]:
 def _read_one(path: Path) -> list[Array]:
     columns = _columns(read_head(path))
     if not columns:
-        raise FormatError("the header is not that of a SwisTrack track file", line=1)
+        raise FormatError("the header does not belong to a SwisTrack track file", line=1)
     table = read_table(path, TableLayout("\t", columns, 1, tuple(range(len(columns)))))
     if np.isnan(table.numbers[0]).any():
         raise FormatError("a row has no frame number")

@@ -10,7 +10,7 @@
         mujoco.mj_step(model, data)
 
 Needs numpy and mujoco, and the files block.json and flow.npz in its folder. SI units; angles in
-rad, counter-clockwise; the frame is that of the tank's centre.
+rad, counter-clockwise; the origin is the tank's centre.
 """
 
 from __future__ import annotations

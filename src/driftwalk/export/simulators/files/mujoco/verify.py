@@ -40,7 +40,7 @@ def run(model: Any, times: Any, start: Any, *, replicate: int, noise: bool) -> A
 
 
 def compare(model: Any, reference: Any, name: str, count: int | None) -> dict[str, Any]:
-    """Return how far MuJoCo's paths are from those of a set, `still` or `noisy`."""
+    """Return how far MuJoCo's paths are from a set, `still` or `noisy`."""
     times, replicates = reference["time_s"], reference[f"{name}_replicate"][:count]
     off, turned, length = [0.0], [0.0], [0.0]
     for row, replicate in enumerate(replicates):
@@ -72,7 +72,7 @@ def in_words(name: str, found: dict[str, Any]) -> str:
 
 
 def prove(count: int | None = None) -> dict[str, Any]:
-    """Compare both sets, at most so many paths of each, and say whether all are close."""
+    """Compare both sets, up to a number of paths of each, and say whether all are close."""
     model = mujoco.MjModel.from_xml_path(str(HERE / "tank.xml"))
     with np.load(HERE / "reference.npz", allow_pickle=False) as stored:
         reference = dict(stored)

@@ -35,10 +35,10 @@ def test_it_is_the_scatter_over_the_stated_error() -> None:
         errors.append(found)
         stated.append(np.diag(np.linalg.inv(curvature)))
     ratio = np.mean(np.square(errors) / np.mean(stated, axis=0))
-    assert np.isclose(emulator_with(SIMULATIONS - 1).widening ** 2, ratio, rtol=0.15)
+    assert np.isclose(emulator_with(SIMULATIONS - 1).error_inflation ** 2, ratio, rtol=0.15)
 
 
 def test_it_is_one_with_many_simulations_and_without_end_with_few() -> None:
-    assert np.isclose(emulator_with(10**6).widening, 1.0, atol=1e-4)
-    assert emulator_with(SUMMARIES + 3).widening == np.inf
-    assert np.isfinite(emulator_with(SUMMARIES + 5).widening)
+    assert np.isclose(emulator_with(10**6).error_inflation, 1.0, atol=1e-4)
+    assert emulator_with(SUMMARIES + 3).error_inflation == np.inf
+    assert np.isfinite(emulator_with(SUMMARIES + 5).error_inflation)

@@ -1,6 +1,6 @@
 """Words by which the columns of a table are known: quantities, units, and what is no position.
 
-They stand in ``vocabulary.toml``, by language and use.
+They stand in ``unit_and_column_words.toml``, by language and use.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from importlib.resources import files
 from typing import Any, Final
 
 _FILE: Final[dict[str, Any]] = tomllib.loads(
-    (files("driftwalk.record") / "vocabulary.toml").read_text(encoding="utf-8")
+    (files("driftwalk.record") / "unit_and_column_words.toml").read_text(encoding="utf-8")
 )
 
 
