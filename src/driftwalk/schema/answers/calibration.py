@@ -90,16 +90,10 @@ def model_calibration_answer(found: xr.Dataset) -> Answer:
     verdict = stored_verdict(found)
     parts += verdict_parts(verdict)
     warnings = sentences(found, "warning")
+    # Single numbers that a calibration may lack: without matched summaries there is no discrepancy.
     numbers = (
-        *(
-            "score",
-            "score_std",
-            "searched_score",
-            "matched_score",
-            "discrepancy",
-            "discrepancy_median",
-        ),
-        *("discrepancy_q95", "interval_stretch"),
+        *("score", "score_std", "searched_score", "matched_score"),
+        *("discrepancy", "discrepancy_median", "discrepancy_q95", "interval_stretch"),
     )
     attributes = ("confidence", "step_interval_s", "duration_s", "position_noise_m", "seed")
     facts = {
