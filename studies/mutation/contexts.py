@@ -17,6 +17,7 @@ from mutate import ROOMS, ROOT
 
 _COVERAGE: Any = None
 _COST: dict[str, float] = {}
+_SLOW: list[str] = []
 if "MAP" in os.environ:
     import coverage
 
@@ -32,6 +33,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     begin = time.process_time()
     yield
     _COST[item.nodeid] = time.process_time() - begin
+    if item.get_closest_marker("slow") is not None:
+        _SLOW.append(item.nodeid)
     _COVERAGE.switch_context("")
 
 
@@ -47,4 +50,4 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     for report in reporter.stats.get("failed", []) if reporter is not None else []:
         _COST.pop(report.nodeid, None)
     with Path(os.environ["MAP"]).open("w", encoding="utf-8") as stream:
-        json.dump({"tests": tests, "cost": _COST}, stream)
+        json.dump({"tests": tests, "cost": _COST, "slow": _SLOW}, stream)

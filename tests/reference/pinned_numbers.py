@@ -49,10 +49,19 @@ def _sums(values: np.ndarray) -> list[float]:
     ]  # fmt: skip
 
 
+def text_of(found: dict[str, dict[str, list[float]]]) -> str:
+    """Return JSON with a line for each variable, so that a change of one is a line of the diff."""
+    forms = []
+    for form, sums in found.items():
+        lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(one)}" for name, one in sums.items())
+        forms.append(f" {json.dumps(form)}: {{\n{lines}\n }}")
+    return "{\n" + ",\n".join(forms) + "\n}\n"
+
+
 def main() -> None:
     found = {form: sums_of(every_kind(form)) for form in FORMS}
     if "--exact" not in sys.argv:
-        STORED.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        STORED.write_text(text_of(found), encoding="utf-8")
         return
     before = json.loads(STORED.read_text(encoding="utf-8"))
     for form in sorted({*found, *before}):
