@@ -108,11 +108,11 @@ def model_comparison() -> xr.Dataset:
     return compare_models(track(), ["inertial", "active+wall"], study=study, budget=few, threads=2)
 
 
-def model_calibration() -> xr.Dataset:
+def model_calibration(*, matched: bool) -> xr.Dataset:
     model = motion_model("inertial")
     values = {"speed_std": 0.02, "memory_time": 0.8, "turn_rate": 0.5}
     with pytest.MonkeyPatch.context() as patch:
-        simulate_little(patch, matched=True)
+        simulate_little(patch, matched=matched)
         return calibrate(moving(model, values, 40.0, seed=1), model, threads=2)
 
 
@@ -162,7 +162,10 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     "calibration of one parameter": lambda: calibration_of_a_function(DIFFUSE),
     "calibration of two parameters": lambda: calibration_of_a_function(TUMBLE),
     "model_comparison": model_comparison,
-    "model_calibration": model_calibration,
+    "model_calibration": lambda: model_calibration(matched=True),
+    "model_calibration whose summaries are hardly matched": lambda: model_calibration(
+        matched=False
+    ),
     "fit": lambda: dw.fit_motion(track(), coarse_study(), angle="none"),
     "fit with the angle in the state": lambda: dw.fit_motion(
         track(), coarse_study(), angle="state"

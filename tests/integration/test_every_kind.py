@@ -14,7 +14,8 @@ from driftwalk.schema.stores.netcdf import open_netcdf
 
 # What needs a search, a fit or many runs of blocks.
 COSTLY = (
-    *("model_calibration", "calibration", "calibration of one parameter"),
+    *("model_calibration", "model_calibration whose summaries are hardly matched"),
+    *("calibration", "calibration of one parameter"),
     *("calibration of two parameters", "model_comparison", "model_check", "recovery"),
     *("model_recovery", "fit", "fit of several flows", "fit with the angle in the state"),
     *(
