@@ -15,6 +15,7 @@ from fits_of_effects import (
     fit_of_a_flawed_recording,
     fit_of_free_bodies,
     fit_of_glued_blocks,
+    fit_that_estimates_the_wall,
     fit_with_a_measured_flow,
     fit_with_a_measured_series,
     fit_with_modes,
@@ -177,6 +178,7 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     "fit of glued blocks": fit_of_glued_blocks,
     "fit of free bodies": fit_of_free_bodies,
     "fit of a flawed recording": fit_of_a_flawed_recording,
+    "fit that estimates the wall": fit_that_estimates_the_wall,
     "model_check": check,
     "model_check with a measured flow": lambda: checked(
         "fit with a measured flow", in_the_stirred_flow()

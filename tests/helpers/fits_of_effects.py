@@ -12,7 +12,7 @@ from fit_worlds import coarse_study, driven
 
 import driftwalk as dw
 from driftwalk.flow.analytic import flow_from_function
-from driftwalk.likelihood import EarlierFit
+from driftwalk.likelihood import EarlierFit, estimate_wall
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import build_flow_field, build_trajectory
 
@@ -117,6 +117,11 @@ def fit_of_glued_blocks() -> xr.Dataset:
     )
     fit = dw.fit_motion(alone, single)
     return dw.fit_motion(glued, pair, earlier=EarlierFit(fit, [alone]))
+
+
+def fit_that_estimates_the_wall() -> xr.Dataset:
+    track = driven(3, 60.0, {"tank.wall_restitution": 0.8, "tank.wall_friction": 0.3})
+    return estimate_wall(dw.fit_motion(track, coarse_study()), [track])
 
 
 @cache

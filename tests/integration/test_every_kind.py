@@ -32,6 +32,7 @@ COSTLY = (
         "fit of glued blocks",
         "fit of free bodies",
         "fit of a flawed recording",
+        "fit that estimates the wall",
         "model_check with a measured flow",
         "model_check with a measured series",
         "model_check of a flawed recording",

@@ -18,11 +18,13 @@ LONG = (
     *("fit of several flows",),
 )
 # Between linear algebra with and without AVX2 and FMA, and kernels with AVX2 and with baseline
-# instructions, the largest difference of another form was 2e-7, and of these 6e-6, 1e-4 and 4e-6.
+# instructions, the largest difference of another form was 2e-7, and of these 6e-6, 1e-4, 1e-3 and
+# 4e-6.
 TOLERANCE = 1e-5
 WIDER = {
     "fit of a flawed recording": 1e-4,
     "model_check of a flawed recording": 2e-3,
+    "fit that estimates the wall": 1e-2,
     "outcome_posterior": 1e-4,
 }
 
