@@ -84,7 +84,7 @@ class Binding(Section):
     '4 A (N,S,N,S); N latches with S'
     """
 
-    section_name: ClassVar[str] = "binding"
+    section_name: ClassVar[str] = "assembly.binding"
 
     kinds: tuple[Kind, ...]
     """Kinds of blocks; the blocks at the start are of them in this order."""
@@ -236,8 +236,10 @@ def read_binding(path: str | Path) -> Binding:
     except FormatError as error:
         raise ConfigurationError(f"{path}: {error.reason}") from error
     except ConfigurationError as error:
-        where = _place(text.decode("utf-8-sig"), str(error))
-        raise ConfigurationError(f"{path}{where}: {error}") from error
+        # In its own file the section has no parent.
+        reason = str(error).replace("[assembly.binding]", "[binding]")
+        where = _place(text.decode("utf-8-sig"), reason)
+        raise ConfigurationError(f"{path}{where}: {reason}") from error
 
 
 def _place(text: str, message: str) -> str:

@@ -227,7 +227,7 @@ def test_figures_come_with_the_numbers_that_they_draw(run: Path, tmp_path: Path)
     ("words", "message"),
     [
         (("{run}", "--to", "csv", "--seed", "1"), "csv has no use for --seed"),
-        (("{run}", "--to", "gif", "--speed", "0"), "above zero: got 0"),
+        (("{run}", "--to", "gif", "--speed", "0"), "speed must be positive"),
         (("{run}", "--to", "gif"), "at most 1200 s are written"),
         (("{run}", "--to", "csv", "--replicate", "1"), "a recording, which has no replicates"),
         (("{blocks}", "--to", "csv", "--replicate", "7"), "no run 7"),

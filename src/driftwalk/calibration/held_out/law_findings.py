@@ -117,7 +117,7 @@ def bout_sentences(found: tuple[BoutDistance, ...]) -> Iterator[str]:
     Examples
     --------
     >>> list(bout_sentences((BoutDistance("slow", 0.31, 0.14, 0.2, 0.3),)))
-    ['slow bouts differ in length: D = 0.310, in the model's own recordings below 0.140']
+    ["slow bouts differ in length: D = 0.310, in the model's own recordings below 0.140"]
     """
     for one in found:
         if one.distance > one.limit:
