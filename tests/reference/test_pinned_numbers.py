@@ -12,11 +12,8 @@ import pytest
 from every_kind import FORMS, every_kind
 from pinned_numbers import STORED, sums_of
 
-# These take three seconds or more.
-LONG = (
-    *("model_calibration", "outcome_posterior", "yield", "calibration of two parameters"),
-    *("fit of several flows",),
-)
+# These take three seconds or more, and their rooms have other fast tests.
+LONG = ("model_calibration", "outcome_posterior", "yield", "calibration of two parameters")
 # Between linear algebra with and without AVX2 and FMA, and kernels with AVX2 and with baseline
 # instructions, the largest difference of another form was 2e-7, and of these 6e-6, 1e-4, 1e-3 and
 # 4e-6.
