@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from euler_blocks import DEPTH_M, FORCE_INTERVAL_S, MASS_KG, SIDE_M, euler_recordings, stirred
+from euler_blocks import (
+    DEPTH_M,
+    FORCE_INTERVAL_S,
+    MASS_KG,
+    SIDE_M,
+    Velocity,
+    euler_recordings,
+    stirred,
+)
 from fit_worlds import coarse_study, driven
 
 import driftwalk as dw
@@ -17,7 +26,7 @@ from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import build_flow_field, build_trajectory
 
 AXIS = np.arange(-16, 17) * 0.01
-PERIOD_S = 12.0
+ERROR = 2e-3
 
 
 def stirred_study(**more: Any) -> Study:
@@ -37,48 +46,59 @@ def stirred_study(**more: Any) -> Study:
     return apply_overrides(Study(), {**stated, **more})
 
 
-def alternating(x: np.ndarray, y: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return a stirred flow whose mirror image comes and goes."""
-    u, v = stirred(x, y)
-    mirrored_u, mirrored_v = stirred(-x, y)
-    strength = 0.6 * np.sin(2.0 * np.pi * time / PERIOD_S)
-    return u + strength * mirrored_u, v - strength * mirrored_v
+def alternating(share: float, amplitude: Callable[[float], Any]) -> Velocity:
+    """Return a stirred flow, and its mirror image as a mode."""
+
+    def velocity(x: np.ndarray, y: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
+        u, v = stirred(x, y)
+        mirrored_u, mirrored_v = stirred(-x, y)
+        strength = share * amplitude(time)
+        return u + strength * mirrored_u, v - strength * mirrored_v
+
+    return velocity
 
 
-def measured(time: np.ndarray | None = None) -> xr.Dataset:
-    """Return the alternating flow as it is measured, a vector in twenty missing; without times its
-    mean."""
+def in_and_out(time: float) -> float:
+    """Return an amplitude with a period of 12 s."""
+    return float(np.sin(2.0 * np.pi * time / 12.0))
+
+
+def frames_of(velocity: Velocity, time: np.ndarray, *, error: float = ERROR) -> xr.Dataset:
+    """Return measured frames of a flow; a vector in twenty is missing."""
     generator = np.random.default_rng(4)
     x, y = np.meshgrid(AXIS, AXIS)
-    frames = [stirred(x, y)] if time is None else [alternating(x, y, one) for one in time]
-    values = np.stack(frames, axis=1)
-    values += 2e-3 * generator.normal(size=values.shape)
-    flag = np.where(np.hypot(x, y) < 0.158, 1, 0) * np.ones(values.shape[1:], dtype=np.int8)
+    values = np.stack([velocity(x, y, one) for one in time], axis=1)
+    flag = np.where(np.hypot(x, y) < 0.158, 1, 0) * np.ones((time.size, 1, 1), dtype=np.int8)
     flag[(generator.random(flag.shape) < 0.05) & (flag == 1)] = 2
-    u, v = values if time is not None else values[:, 0]
-    flag = flag if time is not None else flag[0]
+    u, v = values + error * generator.normal(size=values.shape)
     attrs = {"method": "file", "source": "piv.nc", "cell_size_m": 0.01}
     return build_flow_field(AXIS, AXIS, u=u, v=v, flag=flag, time=time, attrs=attrs)
+
+
+def steady(x: np.ndarray, y: np.ndarray, _: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the stirred flow, at any time."""
+    return stirred(x, y)
 
 
 @cache
 def in_the_stirred_flow() -> xr.Dataset:
     """Return a recording of 80 s."""
-    return euler_recordings(lambda x, y, _: stirred(x, y), worlds=1, seconds=80.0, seed=3)[0]
+    return euler_recordings(steady, worlds=1, seconds=80.0, seed=3)[0]
 
 
 @cache
 def in_the_alternating_flow() -> xr.Dataset:
     """Return a recording of 80 s."""
-    return euler_recordings(alternating, worlds=1, seconds=80.0, seed=3)[0]
+    return euler_recordings(alternating(0.6, in_and_out), worlds=1, seconds=80.0, seed=3)[0]
 
 
 def fit_with_a_measured_flow() -> xr.Dataset:
-    return dw.fit_motion(in_the_stirred_flow(), stirred_study(), flow=measured())
+    field = frames_of(steady, np.zeros(1)).isel(time=0, drop=True)
+    return dw.fit_motion(in_the_stirred_flow(), stirred_study(), flow=field)
 
 
 def fit_with_a_measured_series() -> xr.Dataset:
-    series = measured(np.arange(0.0, 82.0))
+    series = frames_of(alternating(0.6, in_and_out), np.arange(0.0, 82.0))
     return dw.fit_motion(in_the_alternating_flow(), stirred_study(), flow=series)
 
 
@@ -88,9 +108,7 @@ def fit_with_modes() -> xr.Dataset:
 
 def fit_of_free_bodies() -> xr.Dataset:
     """Return the fit of two blocks in one recording."""
-    (two,) = euler_recordings(
-        lambda x, y, _: stirred(x, y), worlds=1, seconds=80.0, seed=12, stirring_length=0.1
-    )
+    (two,) = euler_recordings(steady, worlds=1, seconds=80.0, seed=12, stirring_length=0.1)
     return dw.fit_motion(two, stirred_study(**{"fit.interaction": True}))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,16 +10,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from euler_blocks import (
-    DEPTH_M,
     DRAG,
-    FORCE_INTERVAL_S,
-    MASS_KG,
-    SIDE_M,
-    Velocity,
     euler_recordings,
     stirred,
 )
 from fit_worlds import coarse_study, recording
+from fits_of_effects import AXIS, ERROR, alternating, frames_of, stirred_study as study_with
 from scipy.integrate import trapezoid
 
 import driftwalk as dw
@@ -31,60 +26,14 @@ from driftwalk.likelihood.fitted_modes import stored_coefficients
 from driftwalk.likelihood.measured_flow import MEASURED, MeasuredFlow, measured_flow
 from driftwalk.likelihood.measured_series import stored_flow
 from driftwalk.likelihood.preparation import estimate_of, prepare, spline_of
-from driftwalk.model import Study, apply_overrides
+from driftwalk.model import apply_overrides
 from driftwalk.schema import build_flow_field
 from driftwalk.simulation.series import continued_flow, velocity_at
-
-AXIS = np.arange(-16, 17) * 0.01
-ERROR = 2e-3
-
-
-def study_with(**more: Any) -> Study:
-    return apply_overrides(
-        Study(),
-        {
-            "tank.diameter_m": 0.32,
-            "block.side_m": SIDE_M,
-            "block.mass_kg": MASS_KG,
-            "block.depth_m": DEPTH_M,
-            "forces.force_interval_s": FORCE_INTERVAL_S,
-            "fit.spline_spacing_m": 0.04,
-            "fit.law": "paper",
-            "fit.camera": "exact",
-            "fit.flow_strength": "constant",
-            "fit.force_memory_s": "white",
-            **more,
-        },
-    )
 
 
 def wave(time: np.ndarray | float) -> Any:
     """Return an amplitude of unit rms that has no period."""
     return np.sin(0.21 * np.asarray(time)) + np.cos(0.37 * np.sqrt(2.0) * np.asarray(time))
-
-
-def alternating(share: float, amplitude: Callable[[float], Any] = wave) -> Velocity:
-    """Return a stirred flow, and its mirror image as a mode."""
-
-    def velocity(x: np.ndarray, y: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
-        u, v = stirred(x, y)
-        mirrored_u, mirrored_v = stirred(-x, y)
-        strength = share * amplitude(time)
-        return u + strength * mirrored_u, v - strength * mirrored_v
-
-    return velocity
-
-
-def frames_of(velocity: Velocity, time: np.ndarray, *, error: float = ERROR) -> xr.Dataset:
-    """Return measured frames of a flow; a vector in twenty is missing."""
-    generator = np.random.default_rng(4)
-    x, y = np.meshgrid(AXIS, AXIS)
-    values = np.stack([velocity(x, y, one) for one in time], axis=1)
-    flag = np.where(np.hypot(x, y) < 0.158, 1, 0) * np.ones((time.size, 1, 1), dtype=np.int8)
-    flag[(generator.random(flag.shape) < 0.05) & (flag == 1)] = 2
-    u, v = values + error * generator.normal(size=values.shape)
-    attrs = {"method": "file", "source": "piv.nc", "cell_size_m": 0.01}
-    return build_flow_field(AXIS, AXIS, u=u, v=v, flag=flag, time=time, attrs=attrs)
 
 
 def read(field: xr.Dataset, *, duration: float = 0.0, **more: Any) -> MeasuredFlow:
@@ -95,7 +44,7 @@ def read(field: xr.Dataset, *, duration: float = 0.0, **more: Any) -> MeasuredFl
 @pytest.mark.slow
 def test_mean_and_modes_are_those_of_the_flow_within_their_errors() -> None:
     time = np.arange(0.0, 200.0, 2.0)
-    field = frames_of(alternating(0.3), time)
+    field = frames_of(alternating(0.3, wave), time)
     # A frame without vectors is no frame.
     field["flag"][7] = 2
     one, time = read(field), np.delete(time, 7)
@@ -122,7 +71,7 @@ def test_mean_and_modes_are_those_of_the_flow_within_their_errors() -> None:
 
 @pytest.mark.slow
 def test_the_sum_of_squares_counts_mean_and_modes() -> None:
-    one = read(frames_of(alternating(0.3), np.arange(60.0)), **{"fit.flow_error_m_s": 4e-3})
+    one = read(frames_of(alternating(0.3, wave), np.arange(60.0)), **{"fit.flow_error_m_s": 4e-3})
     spline = one.spline
     flow = one.own.reshape(2, 2, spline.rows, spline.columns)
     flow = flow + 0.01 * np.random.default_rng(1).normal(size=flow.shape)
@@ -148,7 +97,7 @@ def test_the_sum_of_squares_counts_mean_and_modes() -> None:
 def test_the_clock_goes_on_as_in_a_simulation(repeat: str) -> None:
     """Beyond the frames the sum of mean and modes is the series that is simulated."""
     time = np.arange(0.0, 10.0, 0.5)
-    field = frames_of(alternating(0.3), time, error=0.0)
+    field = frames_of(alternating(0.3, wave), time, error=0.0)
     study = study_with(**{"flow.repeat": repeat})
     one = measured_flow(field, study, spline_of(study), duration=100.0)
     assert one.amplitudes is not None
@@ -164,7 +113,7 @@ def test_the_clock_goes_on_as_in_a_simulation(repeat: str) -> None:
 @pytest.mark.slow
 def test_many_frames_become_means_of_a_few() -> None:
     time = np.arange(0.0, 450.0, 0.1)
-    small = frames_of(alternating(0.3), time).isel(y=slice(8, 25), x=slice(8, 25))
+    small = frames_of(alternating(0.3, wave), time).isel(y=slice(8, 25), x=slice(8, 25))
     one = read(small)
     assert one.amplitudes is not None
     assert one.amplitudes.time.size == 1500
@@ -176,7 +125,7 @@ def test_many_frames_become_means_of_a_few() -> None:
 @pytest.mark.slow
 def test_what_a_fit_cannot_take_is_refused_with_the_way() -> None:
     time = np.arange(0.0, 60.0)
-    field = frames_of(alternating(0.3), time)
+    field = frames_of(alternating(0.3, wave), time)
     with pytest.raises(InputError, match=r"spans 0 to 59 s.*clock of the recording.*flow\.repeat"):
         read(field, duration=90.0)
     late = field.assign_coords(time=field["time"] + 30.0)
@@ -204,7 +153,7 @@ def test_what_a_fit_cannot_take_is_refused_with_the_way() -> None:
 @pytest.fixture(scope="module")
 def made() -> tuple[xr.Dataset, xr.Dataset, xr.Dataset]:
     """Return a recording, the measured frames, and the fit with them."""
-    velocity = alternating(0.35)
+    velocity = alternating(0.35, wave)
     (seen,) = euler_recordings(velocity, worlds=1, seconds=400.0, seed=5)
     # Every second sample, for speed.
     seen = seen.isel(time=slice(None, None, 2))
@@ -240,7 +189,7 @@ def test_the_flow_of_the_fit_is_the_series_at_the_frames(made: Any) -> None:
     x, y = np.meshgrid(found["x"].values, found["y"].values)
     near = np.hypot(x, y) < 0.1
     for frame in (0, 77, 400):
-        u, v = alternating(0.35)(x, y, float(frame))
+        u, v = alternating(0.35, wave)(x, y, float(frame))
         off = np.hypot(found["u"].values[frame] - u, found["v"].values[frame] - v)[near]
         assert np.sqrt((off**2).mean()) < 0.04 * np.sqrt((np.hypot(u, v)[near] ** 2).mean())
     # It is long enough for the recording, and says so where it is not.

@@ -12,6 +12,8 @@ from driftwalk.assembly.outcomes.outcome_classes import class_shapes
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import require_kind
+from driftwalk.schema.kinds import find_kind
+from driftwalk.schema.kinds.assembly import ASSEMBLY
 from driftwalk.schema.shapes import MOST_NAMED, all_single, counted_assemblies
 
 if TYPE_CHECKING:
@@ -103,7 +105,7 @@ def histories(datasets: Sequence[xr.Dataset], *, classes: Sequence[str] | None =
     rows: list[tuple[list[str], Floats, float]] = []
     for found in datasets:
         require_kind(found, "assembly classification", "kinetics need one of them")
-        rows += _of_runs(found) if "run" in found.dims else _of_recording(found)
+        rows += _of_runs(found) if find_kind(found) is ASSEMBLY else _of_recording(found)
     passed = dict.fromkeys(name for row in rows for name in row[0])
     if counted := [name for name in passed if counted_assemblies(name)]:
         raise InputError(
