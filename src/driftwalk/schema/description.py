@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -235,6 +236,7 @@ _VARIABLE: Final = re.compile(
     r"(?: (?P<holds>int|bool|text|flags|bits))?(?:: (?P<words>.*))?"
 )
 _ATTRIBUTE: Final = re.compile(r"(\w+) (numbers?|text|yes or no|object|list): (.*)")
+_CHOICE: Final = re.compile(r"<(.+?)>")
 
 
 def kind(
@@ -255,7 +257,8 @@ def kind(
 
         A head may say in brackets when its rows are there. A variable with its name alone is a
         coordinate that is called as it is named; an attribute with its name alone is one of
-        `COMMON`.
+        `COMMON`. A row with choices in angle brackets, ``<low|high>``, stands for two rows: one
+        with all the first words, one with all the second ones.
     *more : Variable or Attribute
         Further ones.
     flags : mapping
@@ -263,14 +266,15 @@ def kind(
         set.
     """
     rows = _rows_of(text)
-    facts = dict(row.split(": ", 1) for section, _, row in rows if not section)
-    found = [*_parsed(rows, flags), *more]
+    facts = dict(row.split(": ", 1) for row, _ in rows[""])
+    own = [_variable(*row, flags) for row in rows["variables"]]
+    said = [_attribute(*row) for row in rows["attributes"]]
     return Kind(
         name=facts["kind"],
         version=int(facts["version"]),
-        dimensions=dict(row.split(": ", 1) for section, _, row in rows if section == "dimensions"),
-        variables=tuple(one for one in found if isinstance(one, Variable)),
-        attributes=tuple(one for one in found if isinstance(one, Attribute)),
+        dimensions=dict(row.split(": ", 1) for row, _ in rows["dimensions"]),
+        variables=(*own, *(one for one in more if isinstance(one, Variable))),
+        attributes=(*said, *(one for one in more if isinstance(one, Attribute))),
         read=facts.get("read", ""),
         read_attributes=facts.get("read_attributes", ""),
     )
@@ -287,36 +291,30 @@ def variables(
     >>> one.dims, one.units, one.long_name, one.note
     ('time', 'm', 'place of the body', 'NaN is a gap')
     """
-    found = _parsed(_rows_of(f"variables:\n{text}"), flags)
-    return tuple(one for one in found if isinstance(one, Variable))
+    return tuple(_variable(*row, flags) for row in _rows_of(f"variables:\n{text}")["variables"])
 
 
 def attributes(text: str) -> tuple[Attribute, ...]:
     """Return the attributes of a part of a kind's text; without a head they are always there."""
-    found = _parsed(_rows_of(f"attributes:\n{text}"), {})
-    return tuple(one for one in found if isinstance(one, Attribute))
+    return tuple(_attribute(*row) for row in _rows_of(f"attributes:\n{text}")["attributes"])
 
 
-def _rows_of(text: str) -> list[tuple[str, str, str]]:
-    """Return each row with its section and when it is there, one space between words."""
-    rows, section, when = [], "", ""
+def _rows_of(text: str) -> dict[str, list[tuple[str, str]]]:
+    """Return by section each row, and when it is there; one space stands between words."""
+    rows, section, when = defaultdict[str, list[tuple[str, str]]](list), "", ""
     for line in text.splitlines():
         row = " ".join(line.split())
         if head := _HEAD.fullmatch(row):
             section, when = head[1], head[2] or ""
         elif row:
-            rows.append((section, when, row))
+            rows[section] += [(one, when) for one in _chosen(row)]
     return rows
 
 
-def _parsed(
-    rows: Iterable[tuple[str, str, str]], flags: Mapping[str, Mapping[str, int]]
-) -> Iterator[Variable | Attribute]:
-    for section, when, row in rows:
-        if section == "variables":
-            yield _variable(row, when, flags)
-        elif section == "attributes":
-            yield _attribute(row, when)
+def _chosen(row: str) -> list[str]:
+    """Return the rows that one with choices stands for, else itself alone."""
+    count = max((len(words.split("|")) for words in _CHOICE.findall(row)), default=1)
+    return [_CHOICE.sub(lambda at, n=n: at[1].split("|")[n], row) for n in range(count)]
 
 
 def _variable(row: str, when: str, flags: Mapping[str, Mapping[str, int]]) -> Variable:

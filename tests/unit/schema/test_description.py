@@ -49,6 +49,17 @@ def test_a_text_says_all_of_a_kind() -> None:
     assert [one.when for one in found.attributes] == ["", "", "it was tracked", ""]
 
 
+def test_a_row_with_choices_stands_for_one_row_of_each() -> None:
+    found = variables("share_<low|high>(time) [1]: <lower|upper> limit\nseen(time) bool: seen")
+    assert [(one.name, one.long_name) for one in found] == [
+        ("share_low", "lower limit"),
+        ("share_high", "upper limit"),
+        ("seen", "seen"),
+    ]
+    [x, y] = attributes("<x|y>_m number: place")
+    assert (x.name, y.name) == ("x_m", "y_m")
+
+
 def test_bits_may_be_set_together() -> None:
     [one] = variables("status(run) bits: problems; 0 is sound", {"status": {"escaped": 2}})
     assert (one.bits, one.holds, one.note) == (True, "int", "0 is sound")

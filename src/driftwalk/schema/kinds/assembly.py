@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from driftwalk.schema.description import SOURCE_WARNINGS, Variable, attributes, kind, variables
+from driftwalk.schema.description import SOURCE_WARNINGS, attributes, kind, variables
 from driftwalk.schema.kinds.flow import FLOW_SERIES, began_in_flow
 from driftwalk.schema.kinds.motion import WORLD_STATUS
 
@@ -18,8 +18,7 @@ SETTINGS: Final = (
     chirality text: whether mirror images are one class
     latching text: when two blocks latch
     hidden_face_drag text: drag on joined faces
-    block_restitution number: of collisions
-    block_friction number: of collisions
+    block_<restitution|friction> number: of collisions
     block_side_m number: side of a block, diameter of a disc, length of a rectangle
     arena
     force_interval_s number: how long a force lasts
@@ -39,9 +38,7 @@ attributes (blocks start glued to bodies):
 attributes (faces have types):
     faces text: kinds of blocks, and which types of their faces latch
 attributes (latching by a connector):
-    connector_distance_m number: tolerance of the connector
-    connector_axis_rad number: tolerance of the connector
-    connector_rotation_rad number: tolerance of the connector
+    connector_<distance_m|axis_rad|rotation_rad> number: tolerance of the connector
 """),
     *FLOW_SERIES,
 )
@@ -89,8 +86,7 @@ variables:
     completion_time(run) [s]: time at which all blocks had become one assembly; NaN where it did \
         not happen
     end_time(run) [s]: time at which the run stopped
-    x(run block) [m]: position x of the block's centre; at the end
-    y(run block) [m]: position y of the block's centre; at the end
+    <x|y>(run block) [m]: position <x|y> of the block's centre; at the end
     theta(run block) [rad]: orientation of the block, counter-clockwise from x; at the end
     assembly(run block) int: {_LOWEST}
     drag_coefficient(run) [1]: drag coefficient
@@ -142,8 +138,7 @@ dimensions:
     block: blocks
     face: faces of a block, where they are magnets
 variables:
-    x({_PATH}) [m]: position x of the block's centre
-    y({_PATH}) [m]: position y of the block's centre
+    <x|y>({_PATH}) [m]: position <x|y> of the block's centre
     theta({_PATH}) [rad]: orientation of the block, counter-clockwise from x
     assembly({_PATH}) int: {_LOWEST}
     run int
@@ -178,32 +173,15 @@ attributes:
 )
 
 
-def _rates(name: str, words: str, note: str, law: str) -> tuple[Variable, ...]:
-    return variables(f"""
-    {name}_count(class) [1] int: {words} while the world was of this class
-    {name}_rate(class) [s-1]: {words} over the time in this class; NaN where there is no time
-    {name}_rate_low(class) [s-1]: lower limit of the rate of {note}, {law}
-    {name}_rate_high(class) [s-1]: upper limit of the rate of {note}, {law}
+RATES: Final = variables("""
+    <joining|parting>_count(class) [1] int: <joinings|partings> while the world was of this class
+    <joining|parting>_rate(class) [s-1]: <joinings|partings> over the time in this class; NaN \
+        where there is no time
+    joining_rate_<low|high>(class) [s-1]: <lower|upper> limit of the rate of joining, Poisson, \
+        widened as far as they cluster
+    parting_rate_<low|high>(class) [s-1]: <lower|upper> limit of the rate of parting, exact Poisson
 """)
-
-
-RATES: Final = (
-    *_rates("joining", "joinings", "joining", "Poisson, widened as far as they cluster"),
-    *_rates("parting", "partings", "parting", "exact Poisson"),
-)
 """Rates of joining and parting per class."""
-
-
-def _joins(name: str, of: str, *, faces: str) -> tuple[Variable, ...]:
-    """Return what is known of the joinings, or of what came apart."""
-    return variables(f"""
-    {name}_count [1] int: number of {of}
-    {name}_time({name}) [s]: time of the {of}; NaN where there is none
-    {name}_block({name} side) int: blocks, {of}; {_NOWHERE}
-    {name}_face({name} side) int: {faces}; {_NOWHERE}
-    {name}_class({name}) int: outcome class after the {of}: index into 'class'; {_NOWHERE}
-""")
-
 
 CLASSIFICATION: Final = kind(
     f"""
@@ -226,6 +204,13 @@ variables:
     event_assembly(event side) int: lowest body of the assemblies that joined; {_NOWHERE}
     event_shape(event part) int: shapes of the two assemblies and of both joined: index into \
         'shape'; {_NOWHERE}
+    <event|split>_count [1] int: number of <joinings|partings>
+    <event|split>_time(<event|split>) [s]: time of the <joinings|partings>; NaN where there is none
+    <event|split>_block(<event|split> side) int: blocks, <joinings|partings>; {_NOWHERE}
+    event_face(event side) int: {_FACES}; {_NOWHERE}
+    split_face(split side) int: faces that came apart, as those that join; {_NOWHERE}
+    <event|split>_class(<event|split>) int: outcome class after the <joinings|partings>: index \
+        into 'class'; {_NOWHERE}
     time [s]
     body text
     shape text
@@ -259,8 +244,6 @@ attributes (the tank is known):
     arena
 """,
     *RATES,
-    *_joins("event", "joinings", faces=_FACES),
-    *_joins("split", "partings", faces="faces that came apart, as those that join"),
 )
 
 KINDS: Final = (

@@ -89,16 +89,13 @@ read_attributes: study
 dimensions:
     parameter: parameters of the model, by name
     bound: lower, upper
-    warning: sentences
-    verdict_reason: sentences
+    <warning|verdict_reason>: sentences
     {rows}
     replicate: simulations of a setting
     refined_replicate: simulations of a setting of the refined map
     excerpt_sample: samples of the first seconds
-    density_step_length: bins
-    density_turning_angle: bins
-    step_length_edge: edges of the bins
-    turning_angle_edge: edges of the bins
+    density_<step_length|turning_angle>: bins
+    <step_length|turning_angle>_edge: edges of the bins
     recording_step: steps of the recording
     bootstrap: simulated recordings of the bootstrap
     region_vertex: border of the joint region
@@ -111,8 +108,7 @@ variables:
     warning(warning) text: evidence against the calibration
     {OPTIMUM}ks_distance [1]: KS distance at the optimum
     noise_floor [1]: KS distance of two realisations of the optimum
-    position_noise [m]: position noise of the simulated camera
-    orientation_noise [rad]: orientation noise of the simulated camera
+    <position|orientation>_noise [<m|rad>]: <position|orientation> noise of the simulated camera
     position_quantum [m]: rounding of the simulated camera
     step_interval [s]: time of a step
     duration [s]: length of the recording
@@ -123,8 +119,7 @@ variables:
     ks_turning_angle({grid} replicate) [rad]: turning angle at which the KS maximum sits
     ks_quadrant({grid} replicate) flags: quadrant of the KS maximum
     step_density({grid} {_BINS}) [1]: share of the steps in a bin
-    excerpt_x({grid} excerpt_sample) [m]: position x, first seconds of replicate 0
-    excerpt_y({grid} excerpt_sample) [m]: position y, first seconds of replicate 0
+    excerpt_<x|y>({grid} excerpt_sample) [m]: position <x|y>, first seconds of replicate 0
     excerpt_time(excerpt_sample) [s]: time of the excerpt's samples
     recording_step_length(recording_step) [m]: step length of the recording
     recording_turning_angle(recording_step) [rad]: turning angle (step angle) of the recording
@@ -225,8 +220,7 @@ dimensions:
     profile_point: values along a parameter
     aspect: aspects of the motion, by name
     check: facts of the motion that no model is fitted to
-    warning: sentences
-    verdict_reason: sentences
+    <warning|verdict_reason>: sentences
 variables:
     estimate(parameter): value of the parameter; in its unit
     interval(parameter bound): interval of the parameter; NaN where the estimate is the search's
@@ -242,8 +236,7 @@ variables:
         ones
     trained_distance(aspect) [1]: KS distance; even blocks
     check_median(check): fact of the model, median of its replicates
-    check_low(check): smallest of its replicates
-    check_high(check): largest of its replicates
+    check_<low|high>(check): <smallest|largest> of its replicates
     {_RECORDED}
     score [1]: mean over the aspects of distance over floor; held out
     score_std [1]: its standard error; from leaving blocks out
@@ -288,8 +281,7 @@ dimensions:
     check: facts of the motion that no model is fitted to
     parameter: parameters of all the models
     end: searches: the short ones, and the long one
-    finding: sentences
-    warning: sentences
+    <finding|warning>: sentences
 variables:
     score(model) [1]: mean over the aspects of distance over floor; {_HELD}
     score_std(model) [1]: its standard error; from leaving blocks out
@@ -303,8 +295,7 @@ variables:
     held_out_distance(model aspect) [1]: KS distance; {_HELD}
     trained_distance(model aspect) [1]: KS distance; even blocks
     check_median(model check): fact of the model, median of its replicates
-    check_low(model check): smallest of its replicates
-    check_high(model check): largest of its replicates
+    check_<low|high>(model check): <smallest|largest> of its replicates
     {_RECORDED}
     estimate(model parameter): value of the parameter; NaN where the model has no such parameter
     parameter_unit(parameter) text: unit of the parameter

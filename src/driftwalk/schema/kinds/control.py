@@ -20,8 +20,7 @@ dimensions:
     draw: the estimate, and draws from the uncertainty of the fits
     round: rounds of planning
     field: flow fields
-    y: nodes of the flow
-    x: nodes of the flow
+    <y|x>: nodes of the flow
 variables:
     action(phase class age) int: number of the mode to choose, from 0
     flow(mode) int: number of the flow field of the mode, from 0
@@ -31,15 +30,13 @@ variables:
     constant_reached(mode) [1]: share of the worlds that this mode alone brought to the target
     promised(round) [1]: probability of the target by value iteration; NaN without it
     round_reached(round) [1]: share of the worlds that reached the target under its best policy
-    u(field y x) [m s-1]: flow velocity x
-    v(field y x) [m s-1]: flow velocity y
+    <u|v>(field y x) [m s-1]: flow velocity <x|y>
     flag(field y x) int: origin of the node's value, as in a flow_field
     phase(phase) [s]: shortest time left at a decision of the phase
     class text
     age(age) [s]: time in the class from which the bin holds
     mode text
-    x(x) [m]: x
-    y(y) [m]: y
+    <x|y> [m]
 attributes:
     target text: outcome class to be reached
     by_s number: deadline
@@ -48,8 +45,7 @@ attributes:
     missed number: share of the observations without a class
     dwell_s number: time for which a mode is held at least
     reached number: share of fresh worlds in the target at the deadline
-    reached_low number: lower limit of the share
-    reached_high number: upper limit of the share
+    reached_<low|high> number: <lower|upper> limit of the share
     confidence number: of the intervals
     worlds number: fresh worlds
     worlds_used number: worlds of the whole plan
@@ -75,11 +71,9 @@ dimensions:
     class: outcome classes of the blocks
 variables:
     reached(arm) [1]: share of the worlds in the target at the deadline
-    reached_low(arm) [1]: lower limit of the share; exact
-    reached_high(arm) [1]: upper limit of the share; exact
+    reached_<low|high>(arm) [1]: <lower|upper> limit of the share; exact
     gain(arm) [1]: share of the policy less that of the arm, in the same worlds
-    gain_low(arm) [1]: lower limit of the gain
-    gain_high(arm) [1]: upper limit of the gain
+    gain_<low|high>(arm) [1]: <lower|upper> limit of the gain
     share(arm time) [1]: share of the worlds in the target
     usage(arm mode) [1]: share of the time before completion in a mode
     class_usage(class mode) [1]: the policy's share of the time in a class; NaN in no time

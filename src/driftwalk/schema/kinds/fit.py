@@ -15,19 +15,15 @@ kind: fit
 version: 3
 dimensions:
     flow: flows, by name, with switching times
-    y: nodes of the flow
-    x: nodes of the flow
+    <y|x>: nodes of the flow
     component: u, v
-    knot_y: knots of the spline
-    knot_x: knots of the spline
+    knot_<y|x>: knots of the spline
     parameter: fitted parameters, by name
     bound: lower, upper
-    warning: sentences
-    verdict_reason: sentences
+    <warning|verdict_reason>: sentences
     criterion: criteria of the check, by name
     residual_component: errors in x, in y, and in the angle where it is in the state
-    cell_y: centres of the cells of the check
-    cell_x: centres of the cells of the check
+    cell_<y|x>: centres of the cells of the check
     log_parameter: logarithms of the fitted parameters
     other_log_parameter: the same
     axis: x, y
@@ -41,8 +37,7 @@ dimensions:
     number: numbers of departures from the model, by name
     law: force laws that were fitted, by name
     departure: numbers of departures that were tested, by name
-    measured_y: nodes of a measured flow
-    measured_x: nodes of a measured flow
+    measured_<y|x>: nodes of a measured flow
     body_distance: ranges of the distance of two bodies
     stirring_quantile: equal shares of a posterior
 variables:
@@ -80,8 +75,7 @@ variables:
         right
     autocorrelation_std [1]: its standard deviation if the model is right
     iterations [1] int: steps of the search
-    roughness_weight [1]: weight of the flow's roughness
-    size_weight [1]: weight of the flow's size
+    <roughness|size>_weight [1]: weight of the flow's <roughness|size>
     law_log_evidence(law) [1]: logarithm of the evidence for each law; without its constant, in \
         the beginning of the recordings
     filter_drag_coefficient [1]: C_d of the filter, without added mass
@@ -93,8 +87,7 @@ variables:
     parameter text
     unit(parameter) text: unit of the parameter
     bound(bound) text: end of an interval
-    u({_ON}) [m s-1]: flow velocity x
-    v({_ON}) [m s-1]: flow velocity y
+    <u|v>({_ON}) [m s-1]: flow velocity <x|y>
     u_standard_error({_ON}) [m s-1]: standard error of flow velocity x; at every node, filled ones \
         too
     v_standard_error({_ON}) [m s-1]: standard error of flow velocity y
@@ -105,8 +98,7 @@ variables:
         parameters
     profile_deviance(profile) [1]: deviance along C_d
     profile_half_log_determinant(profile) [1]: half the logarithm of the determinant along C_d
-    x [m]
-    y [m]
+    <x|y> [m]
     component text
     spline_origin(axis) [m]: first knot of the splines
     spline_spacing [m]: distance between knots
@@ -129,8 +121,7 @@ variables (the model was checked):
     residual_cell_size [m]: size of a cell of the check
     criterion text
     residual_component(residual_component) text: component
-    cell_x(cell_x) [m]: x
-    cell_y(cell_y) [m]: y
+    cell_<x|y>(cell_<x|y>) [m]: <x|y>
 variables (a measured flow was given):
     measured_u(measured_y measured_x) [m s-1]: measured velocity x; NaN where nothing was measured
     measured_v(measured_y measured_x) [m s-1]: measured velocity y
@@ -145,8 +136,7 @@ variables (a measured flow was given):
     measured_flow_determined [1]: coefficients of the flow that it determines
     measured_flow_farthest(axis) [m]: where they differ most
     measured_flow_difference [m s-1]: by how much, there
-    measured_x(measured_x) [m]: x
-    measured_y(measured_y) [m]: y
+    measured_<x|y>(measured_<x|y>) [m]: <x|y>
 variables (a measured flow was given that changes in time):
     measured_u_mode(flow_mode measured_y measured_x) [m s-1]: measured velocity x of the modes; \
         NaN where nothing was measured
@@ -191,8 +181,7 @@ variables (one flow is fitted, and the recording is long enough to see its shape
 variables (modes of the flow in time were fitted):
     mode_coefficient(flow_mode component knot_y knot_x) [m s-1]: coefficients of the modes; for \
         amplitudes of unit rms
-    u_mode(flow_mode y x) [m s-1]: velocity x of the modes
-    v_mode(flow_mode y x) [m s-1]: velocity y of the modes
+    <u|v>_mode(flow_mode y x) [m s-1]: velocity <x|y> of the modes
     mode_amplitude(flow_mode mode_time) [1]: amplitudes of the modes, of unit rms; over one \
         period, or in the measured frames
     mode_time(mode_time) [s]: from the first sample on
@@ -238,8 +227,7 @@ variables (with switching times):
         switching times
     flow_force_std(flow) [N]: σ_F in the flow, where flows were named; the parameter force_std is \
         that of the first
-    flow_force_std_low(flow) [N]: lower end of its interval
-    flow_force_std_high(flow) [N]: upper end of its interval
+    flow_force_std_<low|high>(flow) [N]: <lower|upper> end of its interval
     switching_time(switch) [s]: when the flow changes; on the clock of the recordings
     recording_start [s]: first sample of the first recording
 attributes:

@@ -24,14 +24,12 @@ version: 1
 read: u v x y
 dimensions:
     time: frames of a flow that changes
-    y: nodes
-    x: nodes
+    <y|x>: nodes
 variables:
     u({_ON}) [m s-1]: flow velocity x; finite; bilinear between nodes
     v({_ON}) [m s-1]: flow velocity y
     flag({_ON}) flags: origin of the node's value
-    x(x) [m]: x; evenly spaced
-    y(y) [m]: y; evenly spaced
+    <x|y>(<x|y>) [m]: <x|y>; evenly spaced
 variables ({_BODY}):
     u_block({_ON}) [m s-1]: mean block velocity x; before the correction; NaN where the body never \
         was
@@ -69,8 +67,7 @@ attributes ({_RECORDED}):
     min_count number: samples that make a cell a measured one
     samples_used number: samples in the cells
     samples_outside_tank number: samples beyond the wall
-    measured_share number: share of the tank's cells
-    filled_share number: share of the tank's cells
+    <measured|filled>_share number: share of the tank's cells
 attributes ({_TRACERS}):
     tracks_used number: tracks in the cells
     position_noise_m number: noise for the test of links

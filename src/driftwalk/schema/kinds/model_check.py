@@ -28,22 +28,18 @@ MODEL_CHECK: Final = kind(
 kind: model_check
 version: 3
 dimensions:
-    verdict_reason: sentences
-    note: sentences
+    <verdict_reason|note>: sentences
     criterion: criteria, by name
     component: errors in x, in y, and in the angle where it is in the state
     lag: samples
-    y: centres of cells
-    x: centres of cells
+    <y|x>: centres of cells
     part: tenths of the recordings
     speed_range: ranges of the speed
     replicate: simulations at the estimate
     pair: pairs of them
     drawn_replicate: simulations with drawn parameters
-    step_length_bin: bins
-    turning_angle_bin: bins
-    step_length_edge: edges of the bins
-    turning_angle_edge: edges of the bins
+    <step_length|turning_angle>_bin: bins
+    <step_length|turning_angle>_edge: edges of the bins
 variables:
     verdict text: whether the model explains the recordings; "explains", "does not explain" or \
         "cannot tell"
@@ -79,13 +75,11 @@ variables:
     criterion text
     component text
     lag(lag) [1] int: samples
-    x [m]
-    y [m]
+    <x|y> [m]
     part_recording(part) int: recording of the part
     part_start(part) [s]: start of the part; from that of the recording
     part_end(part) [s]: end of the part
-    speed_low(speed_range) [m s-1]: lower end of the range
-    speed_high(speed_range) [m s-1]: upper end of the range
+    speed_<low|high>(speed_range) [m s-1]: <lower|upper> end of the range
 variables (a misfit is sure, but too small to change the verdict):
     note(note) text: the misfit, in a sentence
 variables ({_COMPARED}):

@@ -75,8 +75,7 @@ dimensions:
     time: samples
     body: the block or body
 variables:
-    x(replicate time body) [m]: position x
-    y(replicate time body) [m]: position y
+    <x|y>(replicate time body) [m]: position <x|y>
     theta(replicate time body) [rad]: orientation; in (-π, π]; NaN where a model has none
     time [s]
     body text
@@ -134,10 +133,8 @@ kind: comparison
 version: 1
 dimensions:
     motion: a, b
-    density_step_length: bins
-    density_turning_angle: bins
-    step_length_edge: edges of the bins
-    turning_angle_edge: edges of the bins
+    density_<step_length|turning_angle>: bins
+    <step_length|turning_angle>_edge: edges of the bins
 variables:
     ks_distance [1]: KS distance
     ks_distance_a [1]: KS distance, origins in a
@@ -155,8 +152,7 @@ variables:
     zero_length(motion) [1] int: pairs left out for a step of no length
     gaps(motion) [1] int: pairs left out at a gap
     mode(motion) text: how the steps were cut
-    mean_step_length(motion) [m]: mean step length
-    median_step_length(motion) [m]: median step length
+    <mean|median>_step_length(motion) [m]: <mean|median> step length
     std_turning_angle(motion) [rad]: standard deviation of the turning angle
     step_density(motion density_step_length density_turning_angle) [1]: fraction of steps
     motion text

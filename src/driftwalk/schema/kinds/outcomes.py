@@ -8,7 +8,6 @@ from driftwalk.schema.description import (
     SOURCE_WARNINGS,
     Attribute,
     Variable,
-    attributes,
     kind,
     limited,
     variables,
@@ -16,7 +15,10 @@ from driftwalk.schema.description import (
 from driftwalk.schema.kinds.assembly import CLASS, RATES, SETTINGS
 
 _OF_RUNS: Final = "made from runs"
-_SETTINGS_OF_RUNS: Final = tuple(limited(SETTINGS, _OF_RUNS, without="runs"))
+_SETTINGS_OF_RUNS: Final = (
+    *limited(SETTINGS, _OF_RUNS, without="runs"),
+    Attribute("drawn", "text", "as of the runs", _OF_RUNS),
+)
 _REALISED: Final = "the reference of a sensitivity analysis"
 
 OUTCOME_DISTRIBUTION: Final = kind(
@@ -31,8 +33,7 @@ dimensions:
 variables:
     count(class) [1] int: runs of this class
     proportion(class) [1]: share of runs
-    interval_low(class) [1]: lower limit of the simultaneous confidence interval
-    interval_high(class) [1]: upper limit of the simultaneous confidence interval
+    interval_<low|high>(class) [1]: <lower|upper> limit of the simultaneous confidence interval
     {CLASS}
 variables ({_REALISED}):
     realisation_count(realisation class) [1] int: runs of this class
@@ -47,38 +48,19 @@ attributes:
     confidence number: with which all intervals hold at once
     method text: of the intervals
     complete number: share of runs with one assembly
-    complete_low number: lower end of its interval
-    complete_high number: upper end of its interval
+    complete_<low|high> number: <lower|upper> end of its interval
 attributes ({_OF_RUNS}):
     left_out number: runs without an outcome
     time_s number: when the outcomes were read
-    drawn text: as of the runs
 attributes ({_REALISED}):
     realisations number: realisations
     mean_pairwise_l1 number: mean l1 distance of two
     expected_pairwise_l1 number: what chance alone gives
-    drag_coefficient number: of the reference
-    force_std_N number: of the reference
+    <drag_coefficient|force_std_N> number: of the reference
 """,
     *_SETTINGS_OF_RUNS,
     *SOURCE_WARNINGS,
 )
-
-
-def _course(name: str, words: str) -> tuple[Variable, ...]:
-    return variables(f"""
-    {name}(time) [1]: share of runs before {words}
-    {name}_low(time) [1]: lower limit, share before {words}
-    {name}_high(time) [1]: upper limit, share before {words}
-""")
-
-
-def _medians(name: str, words: str) -> tuple[Attribute, ...]:
-    return attributes(f"""
-    {name}_median_s number: median time of {words}, NaN when not reached
-    {name}_median_low_s number: lower end of its interval
-    {name}_median_high_s number: upper end of its interval
-""")
 
 
 CLASS_TIMES: Final = kind(
@@ -90,21 +72,21 @@ dimensions:
     class: outcome classes
 variables:
     proportion(time class) [1]: share of runs
-    proportion_low(time class) [1]: lower limit of the share of runs
-    proportion_high(time class) [1]: upper limit of the share of runs
+    proportion_<low|high>(time class) [1]: <lower|upper> limit of the share of runs
+    <first_contact|completion>(time) [1]: share of runs before <first contact|completion>
+    first_contact_<low|high>(time) [1]: <lower|upper> limit, share before first contact
+    completion_<low|high>(time) [1]: <lower|upper> limit, share before completion
     time(time) [s]: time from the start of the run
     {CLASS}
 attributes:
     runs number: runs with an outcome
     left_out number: runs without an outcome
     confidence number: with which an interval holds at its time
-attributes ({_OF_RUNS}):
-    drawn text: as of the runs
+    first_contact_median_s number: median time of first contact, NaN when not reached
+    first_contact_median_<low|high>_s number: <lower|upper> end of its interval
+    completion_median_s number: median time of completion, NaN when not reached
+    completion_median_<low|high>_s number: <lower|upper> end of its interval
 """,
-    *_course("first_contact", "first contact"),
-    *_course("completion", "completion"),
-    *_medians("first_contact", "first contact"),
-    *_medians("completion", "completion"),
     *_SETTINGS_OF_RUNS,
 )
 
@@ -112,13 +94,12 @@ attributes ({_OF_RUNS}):
 def _mean(name: str, dim: str, words: str, note: str = "") -> tuple[Variable, ...]:
     return variables(f"""
     {name}({dim}) [1]: {words}, mean over runs{note}
-    {name}_low({dim}) [1]: lower limit, {words}; NaN of a single run
-    {name}_high({dim}) [1]: upper limit, {words}; NaN of a single run
+    {name}_<low|high>({dim}) [1]: <lower|upper> limit, {words}; NaN of a single run
 """)
 
 
 ASSEMBLY_SIZES: Final = kind(
-    f"""
+    """
 kind: assembly_sizes
 version: 1
 dimensions:
@@ -135,11 +116,8 @@ attributes:
     method text: of the intervals
     compactness number: least perimeter over that of the assembly, of assemblies of four blocks \
         and more, weighted by blocks; mean over runs, NaN where there are none
-    compactness_low number: lower end of its interval
-    compactness_high number: upper end of its interval
+    compactness_<low|high> number: <lower|upper> end of its interval
     compactness_runs number: runs with an assembly of four blocks or more
-attributes ({_OF_RUNS}):
-    drawn text: as of the runs
 """,
     *_mean("number", "size", "assemblies of this size per run", "; at the end"),
     *_mean("block_share", "size", "share of the blocks in assemblies of this size", "; at the end"),
@@ -159,15 +137,13 @@ dimensions:
     age: from the beginning of a stay in a class
 variables:
     time_share(class) [1]: share of time in this class, second half of the runs
-    time_share_low(class) [1]: lower limit of the share of time, between runs
-    time_share_high(class) [1]: upper limit of the share of time, between runs
+    time_share_<low|high>(class) [1]: <lower|upper> limit of the share of time, between runs
     class_time(class) [s]: time in this class, all runs
     lifetime_median(class) [s]: median lifetime of the class; NaN where not reached
     lifetime_median_low(class) [s]: lower limit of the median lifetime; NaN where not reached
     lifetime_median_high(class) [s]: upper limit of the median lifetime; NaN where not reached
     survival(age class) [1]: share of stays that last longer, Kaplan-Meier; NaN where there is none
-    survival_low(age class) [1]: lower limit of the share of stays that last longer
-    survival_high(age class) [1]: upper limit of the share of stays that last longer
+    survival_<low|high>(age class) [1]: <lower|upper> limit of the share of stays that last longer
     age(age) [s]: time since a stay began
     {CLASS}
 attributes:
@@ -179,8 +155,6 @@ attributes:
     steady text: whether the shares of time are steady: yes or no
     steady_p number: how often chance makes the last two quarters differ as much
     false_alarms number: share of steady states that the test calls none
-attributes ({_OF_RUNS}):
-    drawn text: as of the runs
 """,
     *RATES,
     *_SETTINGS_OF_RUNS,
@@ -207,8 +181,7 @@ variables:
         none is stated
     determined(parameter) bool: whether the outcomes determine the parameter from both sides
     limit(parameter) text: which ends of the interval the outcomes set: both, lower, upper or none
-    low(parameter): lower end of the range
-    high(parameter): upper end of the range
+    <low|high>(parameter): <lower|upper> end of the range
     observed(data) bool: whether the observed runs hold this kind of data
     offered(data) bool: whether its regions cover in the self-check
     power(data) [1]: power of the likelihood with which they do; NaN where none does
@@ -243,14 +216,6 @@ attributes:
 )
 
 _RATE: Final = "source transition"
-
-
-def _with_error(name: str, unit: str, words: str) -> tuple[Variable, ...]:
-    return variables(f"""
-variables (a target was named):
-    {name}(class) [{unit}]: {words}
-    {name}_standard_error(class) [{unit}]: standard error, {words}
-""")
 
 
 KINETICS: Final = kind(
@@ -289,8 +254,7 @@ variables:
     hidden_change(class hidden hidden_after) [1]: probability of the hidden state after the class \
         was entered
     statistic(test) [1]: Weibull shape of a sojourn, or Spearman's coefficient of two
-    statistic_low(test) [1]: lower end of its 90 % interval
-    statistic_high(test) [1]: upper end of its 90 % interval
+    statistic_<low|high>(test) [1]: <lower|upper> end of its 90 % interval
     events(test) [1] int: sojourns that ended
     p(test) [1]: p-value; likelihood ratio of a shape, Cox's score of a memory
     p_corrected(test) [1]: p-value, corrected for the number of tests (Holm)
@@ -305,6 +269,13 @@ variables (two data sets):
     equal_p(transition) [1]: p-value of equal rates; log-rank of permuted runs, NaN below five \
         events
     equal_p_corrected(transition) [1]: p-value of equal rates, corrected for their number
+variables (a target was named):
+    committor(class) [1]: probability to reach the target from the class
+    committor_standard_error(class) [1]: standard error, probability to reach the target from the \
+        class
+    passage_time(class) [s]: mean first-passage time to the target, of those that do
+    passage_time_standard_error(class) [s]: standard error, mean first-passage time to the target, \
+        of those that do
 attributes:
     verdict text: well mixed, what refuses it, or cannot tell
     chosen text: name of the chosen model
@@ -330,8 +301,6 @@ attributes (the tank is well mixed, for another number of blocks):
 attributes (the tank is not well mixed, for another number of blocks):
     other_blocks_refused text: why no rate is extrapolated
 """,
-    *_with_error("committor", "1", "probability to reach the target from the class"),
-    *_with_error("passage_time", "s", "mean first-passage time to the target, of those that do"),
 )
 
 KINDS: Final = (

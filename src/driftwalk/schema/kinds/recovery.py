@@ -25,20 +25,11 @@ def _statuses(estimated: str, not_estimated: str) -> dict[str, int]:
 def _estimate(name: str, unit: str, words: str) -> tuple[Variable, ...]:
     return variables(f"""
     {name}({_EACH}) [{unit}]: {words}; NaN without a fit
-    {name}_low({_EACH}) [{unit}]: {words}, lower end of the interval
-    {name}_high({_EACH}) [{unit}]: {words}, upper end of the interval
+    {name}_<low|high>({_EACH}) [{unit}]: {words}, <lower|upper> end of the interval
     {name}_sd({_EACH}) [1]: stated standard deviation of ln {words}
     {name}_error({_EACH}) [1]: {words}, estimate / truth - 1
     {name}_z({_EACH}) [1]: {words}, ln(estimate / truth) / sd
     {name}_covered({_EACH}) [1]: {words}, 1 if the interval holds the truth
-""")
-
-
-def _by_angle(name: str, unit: str, words: str, note: str) -> tuple[Variable, ...]:
-    return variables(f"""
-    {name}(angle) [{unit}]: {words}; {note}
-    {name}_low(angle) [{unit}]: {words}, lower end (90 %)
-    {name}_high(angle) [{unit}]: {words}, upper end (90 %)
 """)
 
 
@@ -77,15 +68,19 @@ variables:
     coverage_high({_ALL}) [1]: upper end of the coverage's interval; Clopper-Pearson, 95 %
     median_flow_error(duration angle) [1]: median of the flow's error
     flow_error_90(duration angle) [1]: 90 % quantile of the flow's error
+    drag_coefficient_error_scale(angle) [s0.5]: scale of C_d's error; a of rms error = a / √T
+    drag_coefficient_error_scale_<low|high>(angle) [s0.5]: scale of C_d's error, <lower|upper> end \
+        (90 %)
+    needed_duration(angle) [s]: length that the asked precision needs; (a / precision)²; NaN where \
+        none is asked
+    needed_duration_<low|high>(angle) [s]: length that the asked precision needs, <lower|upper> \
+        end (90 %)
     duration(duration) [s]: length of the recording
     angle(angle) text: use of the orientation
     recording int
     parameter text
 attributes:
-    drag_coefficient number: the truth
-    force_std_N number: the truth
-    force_interval_s number: the truth
-    tracking_noise_m number: the truth
+    <drag_coefficient|force_std_N|force_interval_s|tracking_noise_m> number: the truth
     flow text: the true flow
     sample_interval_s number: time between samples
     recordings_per_fit number: recordings that are fitted together
@@ -101,18 +96,6 @@ attributes:
     *_estimate("drag_coefficient", "1", "drag coefficient"),
     *_estimate("force_std", "N", "standard deviation of the force"),
     *_estimate("tracking_noise", "m", "tracking noise"),
-    *_by_angle(
-        "drag_coefficient_error_scale",
-        "s0.5",
-        "scale of C_d's error",
-        "a of rms error = a / √T",
-    ),
-    *_by_angle(
-        "needed_duration",
-        "s",
-        "length that the asked precision needs",
-        "(a / precision)²; NaN where none is asked",
-    ),
     flags={"status": _statuses("fitted", "not_fitted")},
 )
 

@@ -9,7 +9,6 @@ from typing import Final
 from driftwalk.schema.description import (
     SOURCE_WARNINGS,
     Number,
-    Variable,
     attributes,
     kind,
     limited,
@@ -83,9 +82,7 @@ attributes (the reference says so):
 attributes (the reference has typed faces):
     reference_faces text: kinds of blocks, and which types of their faces latch
 attributes (the reference says so):
-    reference_drag_coefficient number: where the reference lies
-    reference_force_std_N number: where the reference lies
-    reference_tank_diameter_m number: where the reference lies
+    reference_<drag_coefficient|force_std_N|tank_diameter_m> number: where the reference lies
     reference_realisations number: realisations of the reference
     reference_mean_pairwise_l1 number: mean l1 distance of two of them
     reference_expected_pairwise_l1 number: what chance alone gives
@@ -158,8 +155,7 @@ attributes:
 
 _DESIGN: Final = """
     value(setting input): value of the input
-    low(input): lowest value
-    high(input): highest value
+    <low|high>(input): <lowest|highest> value
 """
 
 SOBOL_DESIGN: Final = kind(f"""
@@ -177,14 +173,6 @@ attributes:
 """)
 
 
-def _index(name: str, words: str) -> tuple[Variable, ...]:
-    return variables(f"""
-    {name}(... input) [1]: {words}
-    {name}_half_width(... input) [1]: half width of its confidence interval
-    {name}_corrected(... input) [1]: {words} without sampling noise
-""")
-
-
 SOBOL_INDICES: Final = kind(
     f"""
 kind: sobol_indices
@@ -196,6 +184,10 @@ dimensions:
 variables:
     variance(...): variance over the design; squared output
     noise_share(...) [1]: share of the variance that is sampling noise
+    <first|total>_order(... input) [1]: <first|total> order Sobol' index
+    <first|total>_order_half_width(... input) [1]: half width of its confidence interval
+    <first|total>_order_corrected(... input) [1]: <first|total> order Sobol' index without \
+        sampling noise
     input text
 variables (made by sensitivity_indices):
     proportion(setting output) [1]: share of runs
@@ -204,8 +196,7 @@ attributes:
     samples number: samples of the design
     confidence number: of the half widths
     seed number: seed of the bootstrap
-    pure_noise_first_order_half_width number: what pure noise would have
-    pure_noise_total_order number: what pure noise would have
+    pure_noise_<first_order_half_width|total_order> number: what pure noise would have
 attributes (made by sensitivity_indices):
     runs number: runs of each setting
     left_out number: runs without an outcome
@@ -213,8 +204,6 @@ attributes (made by sensitivity_indices):
     input_units text: units of the inputs, in their order
     study
 """,
-    *_index("first_order", "first order Sobol' index"),
-    *_index("total_order", "total order Sobol' index"),
 )
 
 YIELD: Final = kind(
@@ -239,8 +228,7 @@ variables:
     share(setting time) [1]: share with the target; of the fresh runs where there are some
     front_setting(time) [1] int: setting that the first runs choose for the time
     front_yield(time) [1]: its share of the fresh runs
-    front_yield_low(time) [1]: lower limit of it; exact
-    front_yield_high(time) [1]: upper limit of it; exact
+    front_yield_<low|high>(time) [1]: <lower|upper> limit of it; exact
     time(time) [s]: time from the start of the run
 attributes:
     target text: outcome class to be reached
