@@ -8,7 +8,7 @@ from functools import partial
 from itertools import combinations, product
 from typing import TYPE_CHECKING, Any, Literal
 
-from driftwalk.figures.write import Figures
+from driftwalk.figures.write import Figures, plotted
 from driftwalk.plot.assembly_courses import (
     drawn_classes,
     plot_assembly_sizes,
@@ -93,13 +93,10 @@ def assembly_figures(
     ``write_figures(assembly_figures(outcomes, class_times=times), "run/figures")``
     """
     names = ("", "") if distribution_drawn is None else labels
-    figures: Figures = {
-        "outcomes": lambda: style.figure_of(
-            plot_outcomes(
-                distribution, beside=distribution_drawn, labels=names, realisations=realisations
-            )
-        )
-    }
+    outcomes = partial(
+        plot_outcomes, beside=distribution_drawn, labels=names, realisations=realisations
+    )
+    figures = plotted(distribution, outcomes=outcomes)
     if class_times is not None:
         figures["class_times"] = lambda: class_times_figure(class_times)
     if sizes is not None:
@@ -111,7 +108,7 @@ def assembly_figures(
     if path is not None:
         figures["film_strip"] = lambda: style.figure_of(plot_film_strip(path, run=run)[0])
     if attraction is not None:
-        figures["attraction"] = lambda: style.figure_of(plot_attraction(attraction))
+        figures |= plotted(attraction, attraction=plot_attraction)
     return figures
 
 
@@ -180,9 +177,7 @@ def sensitivity_figures(
     figures: Figures = {}
     if reference is not None:
         realised = reference[["realisation_proportion"]].rename(realisation_proportion="proportion")
-        figures["outcomes"] = lambda: style.figure_of(
-            plot_outcomes(reference, realisations=realised)
-        )
+        figures = plotted(reference, outcomes=partial(plot_outcomes, realisations=realised))
     if components is not None and components.sizes["component"] < 2:
         components = None
     for folder, chosen in _planes(sensitivity):
@@ -249,10 +244,7 @@ def kinetics_figures(kinetics: xr.Dataset) -> Figures:
     --------
     ``write_figures(kinetics_figures(found), "kinetics/figures")``
     """
-    return {
-        "class_graph": lambda: style.figure_of(plot_class_graph(kinetics)),
-        "shares": lambda: style.figure_of(plot_predicted_shares(kinetics)),
-    }
+    return plotted(kinetics, class_graph=plot_class_graph, shares=plot_predicted_shares)
 
 
 def outcome_posterior_figures(posterior: xr.Dataset) -> Figures:
@@ -274,11 +266,8 @@ def outcome_posterior_figures(posterior: xr.Dataset) -> Figures:
     """
     pairs = list(combinations(range(posterior.sizes["parameter"]), 2))
     names = ["posterior", *(f"posterior_{a + 1}_{b + 1}" for a, b in pairs[1:])]
-    drawn = {
-        name: lambda pair=pair: style.figure_of(plot_outcome_posterior(posterior, pair=pair))
-        for name, pair in zip(names, pairs, strict=True)
-    }
-    return {**drawn, "data": lambda: style.figure_of(plot_data_widths(posterior))}
+    plots = [partial(plot_outcome_posterior, pair=pair) for pair in pairs]
+    return plotted(posterior, **dict(zip(names, plots, strict=True)), data=plot_data_widths)
 
 
 def yield_figures(yields: xr.Dataset) -> Figures:
@@ -298,10 +287,7 @@ def yield_figures(yields: xr.Dataset) -> Figures:
     --------
     ``write_figures(yield_figures(found), "yield/figures")``
     """
-    return {
-        "front": lambda: style.figure_of(plot_yield_front(yields)),
-        "settings": lambda: style.figure_of(plot_yield_settings(yields)),
-    }
+    return plotted(yields, front=plot_yield_front, settings=plot_yield_settings)
 
 
 def policy_figures(policy: xr.Dataset) -> Figures:
@@ -321,7 +307,7 @@ def policy_figures(policy: xr.Dataset) -> Figures:
     --------
     ``write_figures(policy_figures(policy), "policy/figures")``
     """
-    return {"policy": lambda: style.figure_of(plot_policy(policy))}
+    return plotted(policy, policy=plot_policy)
 
 
 def trial_figures(control_test: xr.Dataset, path: xr.Dataset | None = None) -> Figures:
@@ -343,10 +329,7 @@ def trial_figures(control_test: xr.Dataset, path: xr.Dataset | None = None) -> F
     --------
     ``write_figures(trial_figures(found), "test/figures")``
     """
-    figures: Figures = {
-        "shares": lambda: style.figure_of(plot_control_shares(control_test)),
-        "run": lambda: style.figure_of(plot_control_run(control_test)),
-    }
+    figures = plotted(control_test, shares=plot_control_shares, run=plot_control_run)
     if path is not None:
         figures["film_strip"] = lambda: style.figure_of(plot_film_strip(path)[0])
     return figures

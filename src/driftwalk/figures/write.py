@@ -14,7 +14,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import atomic_path
 from driftwalk.core.provenance import file_sha256
-from driftwalk.plot.parts.style import add_footer, print_style
+from driftwalk.plot.parts.style import add_footer, figure_of, print_style
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,6 +88,15 @@ def write_figures(
             (target / name).parent.mkdir(parents=True, exist_ok=True)
             written += _save(make(), target / name, formats)
     return written
+
+
+def plotted(found: xr.Dataset, **plots: Callable[[xr.Dataset], Axes]) -> Figures:
+    """Return a table of figures of one axes each, which these functions draw from a dataset."""
+
+    def draw(plot: Callable[[xr.Dataset], Axes]) -> Figure:
+        return figure_of(plot(found))
+
+    return {name: partial(draw, plot) for name, plot in plots.items()}
 
 
 def marked_simulated(figures: Figures, found: xr.Dataset) -> Figures:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.core.arrays import Floats
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.labels import interval_of, number_fact, plane_of, require_variables
 
@@ -68,20 +68,12 @@ def plot_ks_map(
     --------
     ``plot_ks_map(calibration).figure.savefig("ks_map.png")``
     """
-    across, up = plane_of(calibration)
-    require_variables(calibration, "ks_distance", "status", across.name, up.name)
-    dims = (up.name, across.name)
-    score = 1.0 - calibration["ks_distance"].transpose(*dims).values
-    status = _status(calibration, "status", dims)
-    ax = style.axes_or_new(ax)
-    edges = edges_of(calibration, prefix="")
-    mesh = ax.pcolormesh(
-        *edges, np.ma.masked_invalid(score), cmap=style.SCORE_COLORMAP, vmin=0.0, vmax=1.0
+    require_variables(
+        calibration, "ks_distance", "status", *(one.name for one in plane_of(calibration))
     )
-    mesh.set_rasterized(True)
-    _hatch_causes(ax, edges, status, np.isfinite(score))
-    draw_region(ax, calibration, lw=0.9, zorder=5, path_effects=style.outlined(2.0))
-    draw_optimum(ax, calibration)
+    ax = style.axes_or_new(ax)
+    mesh, _ = _draw_scores(ax, calibration, prefix="")
+    mesh.set_clim(0.0, 1.0)
     _finish(ax, calibration, mesh, colorbar)
     return ax
 
@@ -123,23 +115,16 @@ def plot_refined_map(
     from matplotlib.ticker import MaxNLocator
 
     require_variables(calibration, "refined_ks_distance", "refined_surface")
-    across, up = plane_of(calibration)
-    dims = (f"refined_{up.name}", f"refined_{across.name}")
-    score, surface = (
-        1.0 - calibration[name].transpose(*dims).values
-        for name in ("refined_ks_distance", "refined_surface")
-    )
     ax = style.axes_or_new(ax)
-    edges = edges_of(calibration, prefix="refined_")
-    mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(score), cmap=style.SCORE_COLORMAP)
-    mesh.set_rasterized(True)
+    mesh, score = _draw_scores(ax, calibration, prefix="refined_")
     if np.isfinite(score).any():
         low, high = np.nanquantile(score, [0.02, 1.0])
         floor = 1.0 - number_fact(calibration, "noise_floor")
         high = np.nanmax([high, floor])
         mesh.set_clim(low, high + 0.06 * (high - low))
-    status = _status(calibration, "refined_status", dims)
-    _hatch_causes(ax, edges, status, np.isfinite(score))
+    across, up = plane_of(calibration)
+    dims = (f"refined_{up.name}", f"refined_{across.name}")
+    surface = 1.0 - calibration["refined_surface"].transpose(*dims).values
     lines = None
     if min(surface.shape) >= 2 and np.isfinite(surface).any():
         at_x, at_y = (one.values(calibration, "refined_") for one in (across, up))
@@ -150,9 +135,8 @@ def plot_refined_map(
             *_finely(at_x, at_y, surface), levels=levels[(low < levels) & (levels < high)],
             colors="white", linewidths=0.6,
         )  # fmt: skip
-    draw_region(ax, calibration, lw=0.9, zorder=5, path_effects=style.outlined(2.0))
-    draw_optimum(ax, calibration)
-    ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+    x_edge, y_edge = edges_of(calibration, prefix="refined_")
+    ax.set(xlim=x_edge[[0, -1]], ylim=y_edge[[0, -1]])
     bar = _finish(ax, calibration, mesh, colorbar)
     if bar is not None and lines is not None:
         bar.add_lines(lines)
@@ -247,25 +231,23 @@ def region_of(calibration: xr.Dataset) -> Floats | None:
     return vertices if len(vertices) >= 3 else None
 
 
-def _status(calibration: xr.Dataset, name: str, dims: tuple[str, str]) -> Integers:
-    """Return the status bits as whole numbers, 0 throughout when the map has none."""
-    if name not in calibration:
-        return np.zeros([calibration.sizes[dim] for dim in dims], dtype=np.int64)
-    stored = calibration[name].transpose(*dims).values
-    return np.asarray(np.nan_to_num(stored), dtype=np.int64)
-
-
-def _hatch_causes(
-    ax: Axes,
-    edges: tuple[Floats, Floats],
-    status: Integers,
-    known: Bools,
-) -> None:
-    """Hatch every cell that has a cause, or no distance."""
+def _draw_scores(ax: Axes, calibration: xr.Dataset, *, prefix: str) -> tuple[QuadMesh, Floats]:
+    """Draw the scores of a map, and hatch every cell that has a cause, or no distance."""
+    across, up = plane_of(calibration)
+    dims = (f"{prefix}{up.name}", f"{prefix}{across.name}")
+    score = 1.0 - calibration[f"{prefix}ks_distance"].transpose(*dims).values
+    edges = edges_of(calibration, prefix=prefix)
+    mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(score), cmap=style.SCORE_COLORMAP)
+    mesh.set_rasterized(True)
+    status = np.zeros(score.shape, dtype=np.int64)
+    if f"{prefix}status" in calibration:
+        stored = calibration[f"{prefix}status"].transpose(*dims).values
+        status = np.asarray(np.nan_to_num(stored), dtype=np.int64)
     named: set[str] = set()
-    for row, column in zip(*np.nonzero((status != 0) | ~known), strict=True):
+    for row, column in zip(*np.nonzero((status != 0) | ~np.isfinite(score)), strict=True):
         causes = [cause for bit, cause in CAUSES.items() if status[row, column] & bit]
         hatch_cell(ax, edges, (column, row), cause=(*causes, UNKNOWN_CAUSE)[0], named=named)
+    return mesh, score
 
 
 def hatch_cell(
@@ -291,7 +273,9 @@ def hatch_cell(
 
 
 def _finish(ax: Axes, calibration: xr.Dataset, mesh: QuadMesh, colorbar: str) -> Colorbar | None:
-    """Label the axes and add the colour bar with the line of the noise floor."""
+    """Mark the optimum, label the axes, and add the colour bar with the line of the noise floor."""
+    draw_region(ax, calibration, lw=0.9, zorder=5, path_effects=style.outlined(2.0))
+    draw_optimum(ax, calibration)
     across, up = plane_of(calibration)
     ax.set(xlabel=across.label(calibration), ylabel=up.label(calibration))
     across.scale(ax, "x")

@@ -225,7 +225,8 @@ def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[
         ax.add_collection(artist, autolim=False)
     seen = _last_seen(scene)
     digits = 1 if rate < 10.0 else 0
-    size = _size(scene, ax)
+    # The half of a side, or the radius of a disc.
+    size = 0.015 * float(np.ptp(ax.get_xlim())) if scene.side is None else scene.side / 2.0
     for moment in moments:
         # A hair of rounding is forgiven.
         until = int(np.searchsorted(scene.time, moment + 1e-9 * max(1.0, abs(moment)), "right"))
@@ -260,27 +261,15 @@ def _stage(scene: _Scene, rate: float, dots: int) -> tuple[Figure, Axes]:
     ax = figure.add_axes((0.03, 0.03, 0.94, 0.9))
     ax.set_axis_off()
     if draw_arena(ax, scene.arena) is None:
-        _frame_motion(scene, ax)
+        # Everything that is ever seen, in a square.
+        low, high = np.nanmin(scene.place, axis=(0, 1)), np.nanmax(scene.place, axis=(0, 1))
+        half = 0.54 * float((high - low).max()) + (scene.side or 0.0) or 1.0
+        xlim, ylim = np.column_stack([(low + high) / 2.0 - half, (low + high) / 2.0 + half])
+        ax.set(xlim=xlim, ylim=ylim)
     draw_scale_bar(ax)
     words = "real time" if rate == 1.0 else f"{rate:.3g} × real time"
     figure.text(0.96, 0.955, words, size=8.0, va="center", ha="right")
     return figure, ax
-
-
-def _frame_motion(scene: _Scene, ax: Axes) -> None:
-    """Frame everything that is ever seen, in a square."""
-    low, high = np.nanmin(scene.place, axis=(0, 1)), np.nanmax(scene.place, axis=(0, 1))
-    half = 0.54 * float((high - low).max()) + (scene.side or 0.0) or 1.0
-    xlim, ylim = np.column_stack([(low + high) / 2.0 - half, (low + high) / 2.0 + half])
-    ax.set(xlim=xlim, ylim=ylim)
-
-
-def _size(scene: _Scene, ax: Axes) -> float:
-    """Return the half of a side, or the radius of a disc, in cm."""
-    if scene.side is not None:
-        return scene.side / 2.0
-    low, high = ax.get_xlim()
-    return 0.015 * (high - low)
 
 
 def _last_seen(scene: _Scene) -> Integers:
@@ -418,27 +407,21 @@ def _write_by_ffmpeg(path: Path, frames: Iterator[Frame]) -> None:
 
 
 def _write_by_opencv(path: Path, frames: Iterator[Frame]) -> None:
-    first = next(frames)
-    writer = _opencv_writer(path, first.shape[1], first.shape[0])
-    try:
-        writer.write(_blue_first(first))
-        for frame in frames:
-            writer.write(_blue_first(frame))
-    finally:
-        writer.release()
-
-
-def _opencv_writer(path: Path, columns: int, rows: int) -> Any:
     from driftwalk.core.extras import require_opencv
 
     cv2 = require_opencv("an MP4")
+    first = next(frames)
+    rows, columns = first.shape[:2]
     for codec in CODECS:
         code = cv2.VideoWriter.fourcc(*codec)
         writer = cv2.VideoWriter(str(path), code, FRAMES_PER_S[".mp4"], (columns, rows))
         if writer.isOpened():
-            return writer
-    raise InputError("this OpenCV writes no MP4: install the program ffmpeg, or write a .gif")
-
-
-def _blue_first(frame: Frame) -> Frame:
-    return np.ascontiguousarray(frame[:, :, ::-1])
+            break
+    else:
+        raise InputError("this OpenCV writes no MP4: install the program ffmpeg, or write a .gif")
+    try:
+        for frame in itertools.chain([first], frames):
+            # Blue first, as OpenCV has it.
+            writer.write(np.ascontiguousarray(frame[:, :, ::-1]))
+    finally:
+        writer.release()

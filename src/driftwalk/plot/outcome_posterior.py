@@ -50,6 +50,8 @@ def plot_outcome_posterior(
     --------
     ``plot_outcome_posterior(found)``
     """
+    from scipy.ndimage import gaussian_filter
+
     check_kind(posterior, "outcome_posterior", "value", "weight", "node_value")
     ax = style.axes_or_new(ax, height_mm=80.0)
     chosen = [posterior.isel(parameter=at) for at in pair]
@@ -60,7 +62,9 @@ def plot_outcome_posterior(
     )
     x, y = (n.factor * one["value"].values for n, one in zip(numbers, chosen, strict=True))
     edges = [np.linspace(a, b, BINS + 1) for a, b in zip(low, high, strict=True)]
-    mass = _smoothed(np.histogram2d(x, y, edges, weights=posterior["weight"].values)[0])
+    counted = np.histogram2d(x, y, edges, weights=posterior["weight"].values)[0]
+    # Smoothed by the spread of the sample's points.
+    mass: Floats = gaussian_filter(counted, 1.0, mode="reflect")
     middle = [0.5 * (edge[1:] + edge[:-1]) for edge in edges]
     confidence = float(posterior.attrs["confidence"])
     levels = [_level(mass, share) for share in (confidence, 0.5)]
@@ -82,14 +86,6 @@ def plot_outcome_posterior(
     words = [condition(posterior).replace(" (", "\n("), regions, "dots: simulated settings"]
     ax.set_title("\n".join(filter(None, words)), loc="left")
     return ax
-
-
-def _smoothed(mass: Floats) -> Floats:
-    """Return a histogram smoothed by the spread of its sample's points."""
-    from scipy.ndimage import gaussian_filter
-
-    found: Floats = gaussian_filter(mass, 1.0, mode="reflect")
-    return found
 
 
 def _level(mass: Floats, share: float) -> float:
@@ -141,9 +137,7 @@ def plot_data_widths(posterior: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.axvline(1.0, color=style.MUTED, lw=0.7)
     ax.set_yticks(place, kinds)
     ax.invert_yaxis()
-    ax.set(
-        xlabel="median 90 % interval over that without data", xlim=(0.0, 1.1),
-    )  # fmt: skip
+    ax.set(xlabel="median 90 % interval over that without data", xlim=(0.0, 1.1))
     ax.set_title(f"{posterior.attrs['runs']} runs", loc="left")
     ax.spines[["top", "right"]].set_visible(False)
     style.legend_below(ax, 2)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ESTIMATES_LABEL = "bootstrap estimates"
+DISTANCES = ("ks_distance", "ks_distance_standard_error", "ks_distance_replicate")
 
 
 def plot_validation(calibration: xr.Dataset, axes: Any = None) -> list[Axes]:
@@ -93,8 +94,7 @@ def plot_distance_profile(
     ``plot_distance_profile(calibration, parameter="force_std")``
     """
     along = parameter_named(calibration, parameter)
-    held = [f"ks_distance{of}" for of in ("", "_standard_error", "_replicate")]
-    require_variables(calibration, *held, along.name)
+    require_variables(calibration, *DISTANCES, along.name)
     best, factor = along.best(calibration), along.factor
     line = through_optimum(calibration, along)
     values = factor * np.asarray(line[along.name].values, dtype=np.float64)
@@ -214,6 +214,5 @@ def through_optimum(calibration: xr.Dataset, along: PlotParameter) -> xr.Dataset
     """Return the line of the coarse map next to the optimum in the other parameters."""
     others = [one for one in plot_parameters(calibration) if one.name != along.name]
     best = {one.name: one.best(calibration) / one.factor for one in others}
-    wanted = ["ks_distance", "ks_distance_standard_error", "ks_distance_replicate"]
-    line: xr.Dataset = calibration[wanted].sel(best, method="nearest")
+    line: xr.Dataset = calibration[[*DISTANCES]].sel(best, method="nearest")
     return line

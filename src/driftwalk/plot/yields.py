@@ -111,15 +111,12 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax = style.axes_or_new(ax, height_mm=6.0 * len(order) + 32.0, wide=wide)
     for row, at in enumerate(order):
         one = found.isel(setting=at)
-        reach = [
-            [float(one["difference_high"] - one["difference"])],
-            [float(one["difference"] - one["difference_low"])],
-        ]
+        less, low, high = (float(one[f"difference{end}"]) for end in ("", "_low", "_high"))
         word = str(one["standing"].values)
         color = style.MUTED if word == "worse" else style.BLUE
         ax.errorbar(
-            -behind[at], row, xerr=reach, fmt=MARKERS[word], color=color, ms=3.0, lw=0.8,
-            label=WORDS.get(word, word),
+            -less, row, xerr=[[high - less], [less - low]], fmt=MARKERS[word], color=color,
+            ms=3.0, lw=0.8, label=WORDS.get(word, word),
         )  # fmt: skip
     within = found.attrs["indifference"]
     ax.axvspan(-within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"within {100 * within:g} %")

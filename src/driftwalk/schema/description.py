@@ -236,7 +236,6 @@ _VARIABLE: Final = re.compile(
     r"(?: (?P<holds>int|bool|text|flags|bits))?(?:: (?P<words>.*))?"
 )
 _ATTRIBUTE: Final = re.compile(r"(\w+) (numbers?|text|yes or no|object|list): (.*)")
-_CHOICE: Final = re.compile(r"<(.+?)>")
 
 
 def kind(
@@ -313,8 +312,9 @@ def _rows_of(text: str) -> dict[str, list[tuple[str, str]]]:
 
 def _chosen(row: str) -> list[str]:
     """Return the rows that one with choices stands for, else itself alone."""
-    count = max((len(words.split("|")) for words in _CHOICE.findall(row)), default=1)
-    return [_CHOICE.sub(lambda at, n=n: at[1].split("|")[n], row) for n in range(count)]
+    parts = [part.split("|") for part in re.split("[<>]", row)]
+    count = max(map(len, parts))
+    return ["".join(words[n % len(words)] for words in parts) for n in range(count)]
 
 
 def _variable(row: str, when: str, flags: Mapping[str, Mapping[str, int]]) -> Variable:

@@ -112,10 +112,7 @@ def require_variables(dataset: xr.Dataset, *names: str) -> None:
 
 def interval_of(calibration: xr.Dataset, name: str) -> tuple[float, float] | None:
     """Return an interval [low, high] of the facts, None when absent or not finite."""
-    stored = facts_of(calibration).get(name)
-    if stored is None:
-        return None
-    ends = np.asarray(stored, dtype=np.float64)
+    ends = np.asarray(facts_of(calibration).get(name), dtype=np.float64)
     if ends.shape != (2,) or not np.isfinite(ends).all():
         return None
     return float(ends[0]), float(ends[1])

@@ -665,14 +665,8 @@ def set_pole_bars(
     half_side : float
         In the unit of x and y.
     """
-    own = half_side * np.array(
-        [
-            [POLE_BAR.inner, -POLE_BAR.length],
-            [POLE_BAR.outer, -POLE_BAR.length],
-            [POLE_BAR.outer, POLE_BAR.length],
-            [POLE_BAR.inner, POLE_BAR.length],
-        ]
-    )
+    near, far, end = POLE_BAR
+    own = half_side * np.array([[near, -end], [far, -end], [far, end], [near, end]])
     corners, colors = [], []
     for block, face in np.argwhere(np.asarray(pole) != 0):
         turn = theta[block] + face * np.pi / 2.0

@@ -122,8 +122,9 @@ def assembly_answer(
         if drawn is None
         else {"parameters": _drawn(drawn), **_json(drawn, sizes_drawn)},
         **(apart or {}),
-        **({} if attraction is None else {"attraction": _attraction_json(attraction)}),
     }
+    if attraction is not None:
+        answer["attraction"] = {key: attraction.attrs[key] for key in _ATTRACTION}
     return Answer(
         parts,
         answer,
@@ -156,10 +157,6 @@ def attraction_words(attraction: xr.Dataset) -> str:
     )
 
 
-def _attraction_json(attraction: xr.Dataset) -> dict[str, Any]:
-    return {key: value for key, value in attraction.attrs.items() if key in _ATTRACTION}
-
-
 def _drawn(distribution: xr.Dataset) -> list[str]:
     """Return what was drawn for each run."""
     return str(distribution.attrs["drawn"]).split()
@@ -182,18 +179,12 @@ def _classes(found: xr.Dataset, drawn: xr.Dataset | None) -> Table:
     """Return how often each class came, the frequent ones only where there are many."""
     both = [found] if drawn is None else [found, drawn]
     interval = f"{in_percent(found.attrs['confidence'])} simultaneous intervals"
-    heads = [
-        "class",
-        "share",
-        interval,
-        *(["parameters drawn", interval] if drawn is not None else []),
-    ]
+    heads = ["class", "share", interval, "parameters drawn", interval][: 1 + 2 * len(both)]
     shares = [by_name(one, "class", "proportion") for one in both]
-    counts = [by_name(one, "class", "count") for one in both]
     names = list(dict.fromkeys(name for one in shares for name in one))
     # Those too that never came, where there is room: two runs list the same classes.
     few = len(names) <= MOST_ROWS
-    seen = [name for name in names if few or any(one.get(name, 0) for one in counts)]
+    seen = [name for name in names if few or any(one.get(name, 0.0) > 0.0 for one in shares)]
     most = {name: max(one.get(name, 0.0) for one in shares) for name in seen}
     frequent = sorted(seen, key=lambda name: -most[name])[:MOST_ROWS]
     rest = [name for name in seen if name not in frequent]
@@ -204,7 +195,7 @@ def _classes(found: xr.Dataset, drawn: xr.Dataset | None) -> Table:
     ]
     if rest:
         sums = [sum(one.get(name, 0.0) for name in rest) for one in shares]
-        rows.append([f"{len(rest)} others", *(cell for one in sums for cell in (_share(one), ""))])
+        rows.append([f"{len(rest)} others", *(cell for one in sums for cell in (f"{one:.4f}", ""))])
     complete = [interval_cells(one.attrs, "complete", ".4f") for one in both]
     rows.append(["complete", *(cell for cells in complete for cell in cells)])
     return Table(rows, heads)
@@ -217,15 +208,13 @@ def _class_cells(distribution: xr.Dataset, name: str) -> tuple[str, str]:
     return interval_cells(row.rename(proportion="interval"), "interval", ".4f")
 
 
-def _share(value: Any) -> str:
-    return f"{float(value):.4f}"
-
-
 def _sizes_json(sizes: xr.Dataset) -> dict[str, Any]:
     """Return the sizes for programs; all are means over runs."""
     facts = sizes.attrs
-    known = {name: key for name, (key, _) in _OVER_TIME.items() if name in sizes}
-    over_time = [_with_interval(sizes, name, key) for name, key in known.items()]
+    over_time: dict[str, Any] = {"time_s": sizes["time"].values}
+    for name, (key, _) in _OVER_TIME.items():
+        if name in sizes:
+            over_time |= _with_interval(sizes, name, key)
     return {
         "at_end": [
             {
@@ -236,10 +225,7 @@ def _sizes_json(sizes: xr.Dataset) -> dict[str, Any]:
             }
             for row in each(sizes, "size")
         ],
-        "over_time": {
-            "time_s": sizes["time"].values,
-            **{key: value for one in over_time for key, value in one.items()},
-        },
+        "over_time": over_time,
         "compactness": facts["compactness"],
         "compactness_interval": [facts[f"compactness_{end}"] for end in ("low", "high")],
         "method": facts["method"],
@@ -282,7 +268,6 @@ def _with_interval(found: xr.Dataset, name: str, key: str) -> dict[str, Any]:
     return {key: mean, f"{key}_interval": interval}
 
 
-"""Classes in the table, those with the most time."""
 COLUMNS: Final = {
     "time_share": ("share of time", ""),
     "lifetime_median": ("median lifetime (s)", "_s"),
@@ -305,31 +290,15 @@ def steady_parts(steady: xr.Dataset) -> list[Part]:
     heads = [head for head, _ in COLUMNS.values()]
     title = f"bonds break at {_law(facts)}; shares of time from {facts['from_s']:.4g} s on"
     columns = ["class", *(column for head in heads for column in (head, interval))]
-    return [Table(list(rate_rows(steady, tuple(COLUMNS))), columns, title), steady_words(steady)]
-
-
-def rate_rows(found: xr.Dataset, names: tuple[str, ...]) -> list[list[str]]:
-    """Return a row per class that occurred: value and interval of some variables.
-
-    Parameters
-    ----------
-    found : xarray.Dataset
-        With variables on ``class``, each with ``_low`` and ``_high``.
-    names : tuple of str
-        The variables; the first says in which order the classes come.
-    """
-    order = np.argsort(-np.nan_to_num(found[names[0]].values), kind="stable")
-    rows: list[list[str]] = []
-    for place in order.tolist():
-        one = found.isel({"class": place})
-        if not float(one["class_time"]) > 0 or len(rows) == MOST_ROWS:
-            continue
-        cells = [short_class(str(one["class"].values))]
-        for name in names:
+    order = np.argsort(-np.nan_to_num(steady["time_share"].values), kind="stable")
+    occurred = order[steady["class_time"].values[order] > 0][:MOST_ROWS]
+    rows = []
+    for one in each(steady.isel({"class": occurred}), "class"):
+        rows.append([short_class(str(one["class"].values))])
+        for name in COLUMNS:
             value, ends = interval_cells(one, name)
-            cells += [value or "not reached", ends]
-        rows.append(cells)
-    return rows
+            rows[-1] += [value or "not reached", ends]
+    return [Table(rows, columns, title), steady_words(steady)]
 
 
 def steady_words(steady: xr.Dataset) -> str:

@@ -17,6 +17,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.text_files import parse_json
 from driftwalk.schema.check import kind_name
 from driftwalk.schema.description import Kind, Number, Variable
+from driftwalk.schema.kinds import find_kind
 from driftwalk.schema.kinds.calibration import CALIBRATION, OPTIMUM, calibration_of
 from driftwalk.schema.kinds.fit import FIT, PARAMETERS
 from driftwalk.schema.parameters import (
@@ -24,7 +25,6 @@ from driftwalk.schema.parameters import (
     Parameter,
     StoredParameter,
     flat_name,
-    stored_parameters,
 )
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ _PREFIXES: Final = {
 """Variable along the parameters to what stands in front of the flat names."""
 _ROWS: Final = ("", "bound", "axis", "switch", "flow")
 """Dimensions of what is a fact: a number, a pair, a few times."""
-_WITH_FACTS: Final = {kind.name: kind for kind in (FIT, CALIBRATION)}
+_WITH_FACTS: Final = (FIT.name, CALIBRATION.name)
 """Kinds whose variables are facts."""
 _TYPES: Final = {"float": np.float64, "int": np.int64}
 
@@ -95,11 +95,9 @@ def facts_of(dataset: xr.Dataset) -> dict[str, Any]:
     (0.03, 0.02)
     """
     facts: dict[str, Any] = {str(key): value for key, value in dataset.attrs.items()}
-    kind = _WITH_FACTS.get(kind_name(dataset) or "")
-    if kind is None:
+    kind = find_kind(dataset)
+    if kind is None or kind.name not in _WITH_FACTS:
         return facts
-    if kind is CALIBRATION:
-        kind = _calibration_kind(stored_parameters(dataset))
     if "estimate" in dataset.variables and "parameter" in dataset.dims:
         for at, (name, unit) in enumerate(
             zip(dataset["parameter"].values, dataset["unit"].values, strict=True)

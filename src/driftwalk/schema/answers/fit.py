@@ -63,15 +63,10 @@ _NOT_IN_JSON: Final = frozenset(
         *("force_lever_m", "force_lever_m_interval", "residual_cell_size_m"),
         *("orientation_noise_rad", "orientation_noise_rad_interval"),
         *("drag_coefficient_angle_given", "drag_coefficient_angle_given_interval"),
-        *(
-            "spin_correlation",
-            "angle_disagreement_std",
-            "filter_drag_coefficient",
-            "intervals_usable",
-            "restricted",
-        ),
-        *("roughness_weight", "size_weight", "spline_origin_m", "spline_spacing_m"),
-        *("cell_size_m", "recording_start_s", "measured_flow_determined"),
+        *("spin_correlation", "angle_disagreement_std", "filter_drag_coefficient"),
+        *("intervals_usable", "restricted", "roughness_weight", "size_weight"),
+        *("spline_origin_m", "spline_spacing_m", "cell_size_m", "recording_start_s"),
+        "measured_flow_determined",
     }
 )
 """Facts for programs that read fit.nc: of the second fit, of the flow's splines, of the search."""
@@ -112,18 +107,13 @@ def fitted_parts(fit: xr.Dataset, *, hint: str = "") -> list[Part]:
     parts += [Row(label, words) for label, words in law_words(facts).items()]
     parts += law_estimates(fit)
     if "measured_flow_p_value" in facts:
-        chi, mean, std = (
-            f"{facts[f'measured_flow_{name}']:.0f}"
-            for name in ("chi_squared", "expected", "expected_std")
+        said = (
+            f"{facts['measured_flow']}, chi squared of its difference from the fitted one "
+            f"{facts['measured_flow_chi_squared']:.0f}, expected "
+            f"{facts['measured_flow_expected']:.0f} ± {facts['measured_flow_expected_std']:.0f} "
+            f"(p = {facts['measured_flow_p_value']:.2g})"
         )
-        said = f"{chi}, expected {mean} ± {std}"
-        parts.append(
-            Row(
-                "measured flow",
-                f"{facts['measured_flow']}, chi squared of its difference from the fitted one "
-                f"{said} (p = {facts['measured_flow_p_value']:.2g})",
-            )
-        )
+        parts.append(Row("measured flow", said))
     if "wall_share" in facts:
         asked = "wall_contacts" in facts or "wall_left_out" in facts
         tells = facts.get("angle") == "state" and facts["wall_share"] > TELLING_SHARE

@@ -38,7 +38,7 @@ def outcome_posterior_answer(found: xr.Dataset) -> Answer:
         f"{facts['runs']} runs of {facts['blocks']} blocks, classes after {facts['after_s']:g} s; "
         f"{found.sizes['node']} nodes of {facts['node_runs']} simulated runs",
         Row("verdict", str(facts["verdict"])),
-        *(estimate_part(one, float(facts["confidence"])) for one in each(found, "parameter")),
+        *(_estimate(one, float(facts["confidence"])) for one in each(found, "parameter")),
         *reasons,
     ]
     if facts["used"] != "none":
@@ -53,7 +53,7 @@ def number_of(one: xr.Dataset) -> Number:
     return AXIS_NUMBERS.get(name, Number(name, unit))
 
 
-def estimate_part(one: xr.Dataset, confidence: float) -> Part:
+def _estimate(one: xr.Dataset, confidence: float) -> Part:
     """Return the estimate of a parameter with its interval, or what else the data say of it."""
     number = number_of(one)
     if not bool(one["determined"]):

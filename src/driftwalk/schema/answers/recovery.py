@@ -123,8 +123,7 @@ def _warnings(found: xr.Dataset) -> list[str]:
                 f"{where}: {number['without_fit']} of {number['recordings']} recordings could not "
                 f"be fitted: {texts[0]}"
             )
-    longest = found.isel(duration=-1)
-    for part in each(longest, "angle"):
+    for part in each(found.isel(duration=-1), "angle"):
         said += [f"{_where(part)}: {text}" for text in _doubts(part)]
     return said
 
@@ -151,19 +150,15 @@ def _doubts(part: xr.Dataset) -> list[str]:
             f"{round(value['coverage'] * used)} of {used}: they are too narrow here, by a "
             f"factor of about {value['rms_z']:.1f}"
         )
-    excess = _excess(part, value["rms_error"])
+    # Over the error of the law; the longest recordings show a bias that stays.
+    law = float(part["drag_coefficient_error_scale"]) / np.sqrt(float(part["duration"]))
+    excess = float(value["rms_error"] / law)
     if excess > np.exp(NOTABLE.excess / np.sqrt(2.0 * max(used, 1))):
         said.append(
             f"the error of C_d is {excess:.1f} times what the square root of the length gives: do "
             "not trust the length to record"
         )
     return said
-
-
-def _excess(part: xr.Dataset, rms_error: float) -> float:
-    """Return the error over that of the law; the longest recordings show a bias that stays."""
-    law = float(part["drag_coefficient_error_scale"]) / np.sqrt(float(part["duration"]))
-    return float(rms_error / law)
 
 
 def _parts(found: xr.Dataset) -> list[xr.Dataset]:
@@ -182,15 +177,8 @@ def _rows(part: xr.Dataset) -> list[list[str]]:
             else "none"
         )
         errors = [_percent(value[key]) for key in ("median_absolute_error", "absolute_error_90")]
-        rows.append(
-            [
-                RECOVERED[name].symbol or RECOVERED[name].words,
-                *errors,
-                _percent(value["bias"], sign="+"),
-                f"{value['rms_z']:.2f}",
-                covered,
-            ]
-        )
+        errors += [_percent(value["bias"], sign="+"), f"{value['rms_z']:.2f}"]
+        rows.append([RECOVERED[name].short, *errors, covered])
     flow = [_percent(float(part[key])) for key in ("median_flow_error", "flow_error_90")]
     rows.append(["flow", *flow])
     head = [length_text(float(part["duration"])), str(part["angle"].values)]
@@ -294,12 +282,11 @@ def model_warnings(found: xr.Dataset) -> list[str]:
 def _model_row(one: xr.Dataset) -> list[str]:
     count = _model_counts(one)
     unit = str(one["unit"].values)
-    error = float(one["median_error"])
     held = f"{count['covered']} of {count['intervals']}" if count["intervals"] else "no intervals"
     return [
         str(one["parameter"].values).replace("_", " "),
         f"{float(one['truth']):g} {'' if unit == '1' else unit}".rstrip(),
-        f"{100.0 * error:.1f} %" if np.isfinite(error) else "-",
+        _percent(float(one["median_error"])),
         f"{count['determined']} of {count['calibrated']}",
         held,
     ]

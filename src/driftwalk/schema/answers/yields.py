@@ -47,13 +47,11 @@ def yield_answer(found: xr.Dataset) -> Answer:
         setting_table(found),
         front_table(found),
     ]
-    warnings = []
-    if facts["left_out"]:
-        warnings.append(
-            f"{facts['left_out']} runs broke down and count as without the target; use a smaller "
-            "time step"
-        )
-    return Answer(parts, _facts(found), warnings)
+    broken = (
+        f"{facts['left_out']} runs broke down and count as without the target; use a smaller time "
+        "step"
+    )
+    return Answer(parts, _facts(found), [broken] if facts["left_out"] else [])
 
 
 def varied(found: xr.Dataset) -> list[str]:
@@ -161,25 +159,14 @@ def after_yield(found: xr.Dataset) -> Following:
 def setting_table(found: xr.Dataset) -> Table:
     """Return the settings, the best ones first."""
     share = (found["reached"] / found["runs"]).values
-    rank = {"best": 0, "alike": 1, "worse": 2}
-    keys = [
-        (rank[str(word)], -one) for word, one in zip(found["standing"].values, share, strict=True)
-    ]
-    order = sorted(range(len(keys)), key=keys.__getitem__)
+    rank = [("best", "alike", "worse").index(word) for word in found["standing"].values]
+    order = sorted(range(share.size), key=lambda at: (rank[at], -share[at]))
     rows = []
     for at in order[:LISTED]:
         one = found.isel(setting=at)
-        rows.append(
-            [
-                setting_words(found, at),
-                *interval_cells(one, "fresh_yield", ".3f"),
-                f"{share[at]:.3f}",
-                int(one["runs"]),
-                "cannot be distinguished"
-                if one["standing"] == "alike"
-                else str(one["standing"].values),
-            ]
-        )
+        words, standing = setting_words(found, at), str(one["standing"].values)
+        numbers = [*interval_cells(one, "fresh_yield", ".3f"), f"{share[at]:.3f}", int(one["runs"])]
+        rows.append([words, *numbers, standing.replace("alike", "cannot be distinguished")])
     share_words = f"{in_percent(found.attrs['confidence'])} interval"
     columns = ["setting", "yield", share_words, "share in the choosing runs", "runs", "standing"]
     left = len(order) - LISTED
@@ -191,15 +178,13 @@ def front_table(found: xr.Dataset) -> Table:
     """Return the front of yield and time: where the best setting changes, and the yields there."""
     front = found["front_setting"].values
     last = len(front) - 1
-    tenths = range(last // 10, last + 1, max(last // 10, 1))
-    rows = [
-        [
-            f"{float(found['time'][at]):g}",
-            *interval_cells(found.isel(time=at), "front_yield", ".3f"),
-            setting_words(found, int(front[at])),
-        ]
-        for at in tenths
-    ]
+    rows = []
+    for at in range(last // 10, last + 1, max(last // 10, 1)):
+        time, cells = (
+            float(found["time"][at]),
+            interval_cells(found.isel(time=at), "front_yield", ".3f"),
+        )
+        rows.append([f"{time:g}", *cells, setting_words(found, int(front[at]))])
     share_words = f"{in_percent(found.attrs['confidence'])} interval"
     return Table(rows, ["time (s)", "yield", share_words, "setting"], "front of yield and time")
 
