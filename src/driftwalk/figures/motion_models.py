@@ -183,18 +183,10 @@ def _width(one: xr.Dataset) -> str:
 
 def _plot_pair(calibration: xr.Dataset, column: int, row: int, ax: Axes) -> None:
     """Draw the draws of two parameters and the estimate."""
-    across, up = (calibration.isel(parameter=index) for index in (column, row))
-    ax.plot(
-        across["posterior_sample"].values,
-        up["posterior_sample"].values,
-        ".",
-        ms=1.2,
-        color=style.BLUE,
-        alpha=0.6,
-    )
-    ax.plot(
-        float(across["estimate"]), float(up["estimate"]), "+", ms=5.0, mew=1.2, color=style.ORANGE
-    )
+    both = [calibration.isel(parameter=index) for index in (column, row)]
+    draws = (one["posterior_sample"].values for one in both)
+    ax.plot(*draws, ".", ms=1.2, color=style.BLUE, alpha=0.6)
+    ax.plot(*(float(one["estimate"]) for one in both), "+", ms=5.0, mew=1.2, color=style.ORANGE)
     ax.yaxis.set_major_locator(_few_ticks())
 
 

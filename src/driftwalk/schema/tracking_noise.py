@@ -210,32 +210,27 @@ def _bounded(estimate: _Estimate, track: Track) -> _Estimate:
     return estimate._replace(noise=bound.position_noise_m, standard_error=bound.standard_error_m)
 
 
-_NOTHING = _Estimate(math.nan, math.nan, math.nan, 0)
-"""Stands where nothing can be estimated."""
-
-
 @remembered
 def _estimate(time: Floats, series: tuple[Floats, ...]) -> _Estimate:
     """Fit noise and intensity to the lag products of all blocks."""
     starts = _window_starts(time)
     if starts.size < _NOISE.fewest_windows:
-        return _NOTHING
+        return _Estimate(math.nan, math.nan, math.nan, 0)
     blocks = np.array_split(starts, max(8, starts.size // _NOISE.block))
     blocks = blocks[:: math.ceil(len(blocks) / _NOISE.most_blocks)]
-    differences = [
-        [_weights(time, block)[1] * values[_members(block)] for values in series]
-        for block in blocks
-    ]
-    limits = [
-        _NOISE.trim
-        * _robust_std(np.concatenate([block[axis].sum(axis=1) for block in differences]))
-        for axis in range(len(series))
-    ]
-    sums = np.zeros((len(blocks), _NOISE.lags + 1, 4))
-    for index, block in enumerate(blocks):
-        values = np.stack([part.sum(axis=1) for part in differences[index]])
-        good = np.array([np.abs(v) <= limit for v, limit in zip(values, limits, strict=True)])
-        sums[index] = _lag_sums(time, block, values, good)
+    differences = []
+    for block in blocks:
+        weights = _weights(time, block)[1]
+        members = [values[_members(block)] for values in series]
+        differences.append(np.stack([(weights * one).sum(axis=1) for one in members]))
+    spread = [_robust_std(row) for row in np.concatenate(differences, axis=1)]
+    limits = _NOISE.trim * np.array(spread)[:, None]
+    sums = np.stack(
+        [
+            _lag_sums(time, block, values, np.abs(values) <= limits)
+            for block, values in zip(blocks, differences, strict=True)
+        ]
+    )
     noise, intensity = _solve(sums.sum(axis=0))
     left_out = np.array([_solve(sums.sum(axis=0) - part)[0] for part in sums])
     count = len(blocks)

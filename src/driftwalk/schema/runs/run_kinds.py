@@ -39,14 +39,15 @@ class RunKind:
         Title of its live page before the run has finished.
     words : str
         Name of its result in a sentence.
-    command : str
-        The command that makes such a run.
-    file : str
-        The file of its result; a finished run without a specification is known by it.
-    datasets : tuple of str
-        The other datasets that it may hold, without the ending of their files.
     page : callable or str
         Returns the sections of its page.
+    command : str
+        The command that makes such a run; default: the name.
+    file : str
+        The file of its result; a finished run without a specification is known by it. Default: the
+        name with ``.nc``.
+    datasets : tuple of str
+        The other datasets that it may hold, without the ending of their files.
     figures : callable or str, optional
         Returns its figures, a table from their names to functions that draw them.
     live : callable or str, optional
@@ -74,9 +75,9 @@ class RunKind:
     title: str
     under_way: str
     words: str
-    command: str
-    file: str
     page: Maker
+    command: str = ""
+    file: str = ""
     datasets: tuple[str, ...] = ()
     figures: Maker | None = None
     live: Maker | None = None
@@ -88,6 +89,10 @@ class RunKind:
     gives_model: bool = False
     drawn_from: Literal["", "covariance", "region"] = ""
     no_draws: str = "no uncertainty of its values, as a fit or a calibration has"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "command", self.command or self.name)
+        object.__setattr__(self, "file", self.file or f"{self.name}.nc")
 
 
 def load_maker(maker: Maker) -> Callable[..., Any]:
@@ -121,7 +126,6 @@ BUILT_IN: Final = (
         under_way="A calibration under way",
         words="calibration",
         command="calibrate",
-        file="calibration.nc",
         datasets=("flow", "recording"),
         figures="driftwalk.figures.calibration:calibration_figures",
         page=f"{_SECTIONS}.calibration:calibration_sections",
@@ -139,8 +143,6 @@ BUILT_IN: Final = (
         title="Likelihood fit",
         under_way="A fit under way",
         words="fit",
-        command="fit",
-        file="fit.nc",
         datasets=("flow", "recording", "check"),
         figures="driftwalk.runs.fit:figures_of_fit",
         page=f"{_SECTIONS}.fit:fit_sections",
@@ -163,7 +165,6 @@ BUILT_IN: Final = (
         under_way="Self-assembly under way",
         words="self-assembly",
         command="assemble",
-        file="assembly.nc",
         datasets=(
             "distribution",
             "class_times",
@@ -189,8 +190,6 @@ BUILT_IN: Final = (
         title="Sensitivity of self-assembly",
         under_way="A sensitivity analysis under way",
         words="sensitivity analysis",
-        command="sensitivity",
-        file="sensitivity.nc",
         datasets=("reference", "components", "sobol"),
         figures="driftwalk.figures.assembly:sensitivity_figures",
         page=f"{_SECTIONS}.sensitivity:sensitivity_sections",
@@ -203,8 +202,6 @@ BUILT_IN: Final = (
         title="Kinetics of self-assembly",
         under_way="Kinetics under way",
         words="kinetics",
-        command="kinetics",
-        file="kinetics.nc",
         figures="driftwalk.figures.assembly:kinetics_figures",
         page=f"{_SECTIONS}.kinetics:kinetics_sections",
         answer=f"{_ANSWERS}.kinetics:kinetics_answer",
@@ -236,7 +233,6 @@ BUILT_IN: Final = (
         title="Yield of self-assembly",
         under_way="Search for the largest yield under way",
         words="yield",
-        command="yield",
         file="yields.nc",
         figures="driftwalk.figures.assembly:yield_figures",
         page=f"{_SECTIONS}.yields:yield_sections",
@@ -283,7 +279,6 @@ BUILT_IN: Final = (
         under_way="A test of control under way",
         words="test of control",
         command="control test",
-        file="control_test.nc",
         datasets=("path",),
         figures="driftwalk.figures.assembly:trial_figures",
         page=f"{_SECTIONS}.control:trial_sections",
@@ -298,7 +293,6 @@ BUILT_IN: Final = (
         under_way="A recovery study under way",
         words="recovery study",
         command="study recover",
-        file="recovery.nc",
         figures="driftwalk.figures.recovery:recovery_figures",
         page=f"{_SECTIONS}.recovery:recovery_sections",
         answer=f"{_ANSWERS}.recovery:recovery_answer",
@@ -326,7 +320,6 @@ BUILT_IN: Final = (
         under_way="A calibration under way",
         words="calibration",
         command="calibrate",
-        file="model_calibration.nc",
         datasets=("recording", "flow"),
         figures="driftwalk.figures.motion_models:model_calibration_figures",
         page=f"{_SECTIONS}.motion_models:model_calibration_sections",
@@ -342,7 +335,6 @@ BUILT_IN: Final = (
         under_way="A recovery study under way",
         words="recovery study",
         command="study recover",
-        file="model_recovery.nc",
         figures="driftwalk.figures.recovery:model_recovery_figures",
         page=f"{_SECTIONS}.recovery:model_recovery_sections",
         answer=f"{_ANSWERS}.recovery:model_recovery_answer",

@@ -98,18 +98,13 @@ def _refuse_declared(path: Path) -> None:
 
     try:
         declared = whosmat(path, appendmat=False)
-        size = sum(_size(*entry) for entry in declared)
+        size = sum(int(_count(shape)) * _SIZES.get(kind, 8) for _, shape, kind in declared)
     except TypeError:
         return
     refuse_huge(size, path)
     for _, shape, kind in declared:
         if kind in ("struct", "cell"):
             refuse_many(_count(shape), path)
-
-
-def _size(_name: str, shape: tuple[int, ...], kind: str) -> int:
-    """Return how many bytes a variable has in memory by its header."""
-    return int(_count(shape)) * _SIZES.get(kind, 8)
 
 
 def _count(shape: tuple[int, ...]) -> float:
