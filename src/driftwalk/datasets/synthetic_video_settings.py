@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Floats, Singles
+from driftwalk.core.arrays import Floats, Singles
 from driftwalk.core.errors import InputError, did_you_mean
 from driftwalk.core.random_streams import VideoStream
 
@@ -357,12 +357,11 @@ class Bars:
     width: float
     length: float
 
-    def hides(self, frame: int, body: int, points: Floats) -> Bools:
-        """Return which points of the marker's own frame [m], shape (..., 2), the bar covers."""
-        return self.depth(frame, body, points) > 0.0
-
     def depth(self, frame: int, body: int, points: Floats) -> Floats:
-        """Return how deep points of the marker's own frame lie in the bar [m], shape (...)."""
+        """Return how deep points of the marker's own frame lie in the bar [m]; below 0 beside it.
+
+        Points have the shape (..., 2).
+        """
         offset, angle = self.offset[frame, body], self.angle[frame, body]
         across = points[..., 0] * np.cos(angle) + points[..., 1] * np.sin(angle) - offset
         along = -points[..., 0] * np.sin(angle) + points[..., 1] * np.cos(angle)

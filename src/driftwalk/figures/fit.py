@@ -230,8 +230,7 @@ def plot_laws(fit: xr.Dataset, ax: Axes) -> Axes:
         ax.locator_params(axis="x", nbins=5)
     ax.axvline(0.0, color=style.MUTED, lw=0.6)
     ax.set_yticks(place, names)
-    ax.set_ylim(-0.6, len(names) - 0.4)
-    ax.set_xlabel("loss per sample, against the best law (nats)")
+    ax.set(ylim=(-0.6, len(names) - 0.4), xlabel="loss per sample, against the best law (nats)")
     ax.set_title("held out samples; bars: standard error", loc="left")
     unsolved = len(every) - len(known)
     if unsolved:
@@ -273,8 +272,7 @@ def plot_shared_stirring(fit: xr.Dataset, ax: Axes | None = None) -> Axes:
     law = rf"$\exp(-r^2/2L^2)$, $L$ = {1e3 * lengths[1]:.3g} mm"
     ax.plot(r, middle, color=style.INK, label=f"{law} (band: {confidence})")
     ax.axhline(0.0, color=style.MUTED, lw=0.6)
-    ax.set_xlim(0.0, float(r[-1]))
-    ax.set_xlabel("distance of the bodies $r$ (cm)")
+    ax.set(xlim=(0.0, float(r[-1])), xlabel="distance of the bodies $r$ (cm)")
     ax.set_ylabel("correlation of the forces")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
     return ax

@@ -302,8 +302,7 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
         )
     ]
     ax.set_yticks(place, names)
-    ax.set_ylim(-0.6, place.size - 0.4)
-    ax.set_xlim(left=0.0)
+    ax.set(xlim=(0.0, None), ylim=(-0.6, place.size - 0.4))
     ax.set_xlabel("distance, mean of D / floor over the aspects")
     # Above: points and the line of the recording's own parts are anywhere.
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.0)

@@ -316,8 +316,7 @@ def plot_model_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
             ax.axhline(row - 0.5, color=style.PALE, lw=0.8, zorder=0)
     ax.set_yticks(np.arange(len(names)), [name.replace("_", " ") for name in names])
     ax.tick_params(axis="y", length=0.0)
-    ax.set_ylim(len(names) - 0.5, -0.5)
-    ax.set_xlim(*_limits(errors, ends))
+    ax.set(xlim=_limits(errors, ends), ylim=(len(names) - 0.5, -0.5))
     ax.set_xlabel("error of the estimate (%)")
     return ax
 

@@ -100,9 +100,8 @@ def plot_control_shares(test: xr.Dataset, ax: Axes | None = None) -> Axes:
         # Next to each other, past the end.
         place = time[-1:].repeat(2) + 0.02 * (at + 1) * (time[-1] - time[0])
         ax.plot(place, np.ravel(ends), color=line.get_color(), lw=2.0, alpha=0.5)
-    ax.set_xlabel(TIME_LABEL)
+    ax.set(xlim=(time[0], None), ylim=(0.0, None), xlabel=TIME_LABEL)
     ax.set_ylabel(f"share of runs in {short_class(str(test.attrs['target']))}")
-    ax.set(xlim=(time[0], None), ylim=(0.0, None))
     ax.spines[["top", "right"]].set_visible(False)
     ax.set_title(f"bars: {percent(test.attrs['confidence'])} intervals at the end", loc="left")
     style.legend_below(ax, 2)
@@ -149,8 +148,7 @@ def plot_control_run(test: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_yticks(
         range(len(visited)), [short_class(str(test["class"].values[at])) for at in visited]
     )
-    ax.set_xlabel(TIME_LABEL)
-    ax.set_xlim(time[0], time[-1])
+    ax.set(xlim=(time[0], time[-1]), xlabel=TIME_LABEL)
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
 

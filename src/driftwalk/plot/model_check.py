@@ -80,8 +80,7 @@ def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
             label=f"error in {shown}",
         )
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.set(xlabel="lag (samples)", ylabel="autocorrelation")
-    ax.set_xlim(edges[0], edges[-1])
+    ax.set(xlim=edges[[0, -1]], xlabel="lag (samples)", ylabel="autocorrelation")
     # Room below the lowest step.
     ax.use_sticky_edges = False
     return ax
@@ -315,8 +314,7 @@ def plot_own_aspects(found: xr.Dataset, ax: Axes) -> None:
     label = "the recording's own parts"
     ax.plot(found["own_distance"].values, place, "|", ms=9.0, mew=1.4, color=style.INK, label=label)
     ax.set_yticks(place, [ASPECT_WORDS.get(name, name) for name in aspects])
-    ax.set_ylim(len(aspects) - 0.4, -0.6)
-    ax.set(xlim=(0.0, None), xlabel="KS distance D")
+    ax.set(xlim=(0.0, None), ylim=(len(aspects) - 0.4, -0.6), xlabel="KS distance D")
 
 
 def plot_check_ratios(
@@ -348,5 +346,4 @@ def label_checks(found: xr.Dataset, ax: Axes) -> None:
         for name, point in zip(names, shown, strict=True)
     ]
     ax.set_yticks(np.arange(len(names)), words)
-    ax.set_ylim(len(names) - 0.4, -0.6)
-    ax.set_xlabel("model / recording")
+    ax.set(ylim=(len(names) - 0.4, -0.6), xlabel="model / recording")

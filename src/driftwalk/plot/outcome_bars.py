@@ -102,8 +102,7 @@ def plot_outcomes(
     if realisations is not None:
         at = place - (len(both) - 1) / 2.0 * width
         _draw_realisations(ax, at + 0.22 * width, realisations, names, shown)
-    ax.set(xlim=(-0.6, len(drawn) - 0.4), ylim=(0.0, None))
-    ax.set_ylabel("share of runs")
+    ax.set(xlim=(-0.6, len(drawn) - 0.4), ylim=(0.0, None), ylabel="share of runs")
     ax.spines[["top", "right"]].set_visible(False)
     notes = ["right of the line: several assemblies"] if _divide(ax, drawn) else []
     notes += [f"other: {len(names) - len(shown)} rarer classes"] if OTHER in drawn else []

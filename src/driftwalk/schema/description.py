@@ -255,8 +255,8 @@ def kind(
             name number: meaning
 
         A head may say in brackets when its rows are there. A variable with its name alone is a
-        coordinate that is called as it is named; an attribute with its name alone is one of
-        `COMMON`. A row with choices in angle brackets, ``<low|high>``, stands for two rows: one
+        coordinate that is called as it is named, which a row of its dimension may say too
+        (``name [units] int: words``); an attribute with its name alone is one of `COMMON`. A row with choices in angle brackets, ``<low|high>``, stands for two rows: one
         with all the first words, one with all the second ones.
     *more : Variable or Attribute
         Further ones.
@@ -266,12 +266,14 @@ def kind(
     """
     rows = _rows_of(text)
     facts = dict(row.split(": ", 1) for row, _ in rows[""])
+    along = dict(row.split(": ", 1) for row, _ in rows["dimensions"])
     own = [_variable(*row, flags) for row in rows["variables"]]
+    own += [_variable(head, "", {}) for head in along if " " in head]
     said = [_attribute(*row) for row in rows["attributes"]]
     return Kind(
         name=facts["kind"],
         version=int(facts["version"]),
-        dimensions=dict(row.split(": ", 1) for row, _ in rows["dimensions"]),
+        dimensions={head.split()[0]: words for head, words in along.items()},
         variables=(*own, *(one for one in more if isinstance(one, Variable))),
         attributes=(*said, *(one for one in more if isinstance(one, Attribute))),
         read=facts.get("read", ""),

@@ -12,13 +12,13 @@ version: 2
 read: x time
 dimensions:
     time: samples
+    body text: what floats
 variables:
     x([body] time) [m]: position x; NaN where it \
         is unknown
     count [1] int: samples
     flag(time) flags: where it is from
     time [s]
-    body text
 variables (it was tracked):
     seen(time) bool: whether the camera saw it
 attributes:
@@ -33,7 +33,7 @@ def test_a_text_says_all_of_a_kind() -> None:
     further = Attribute("more", "text", "something")
     found = kind(TEXT, further, flags={"flag": {"film": 0, "file": 1}})
     assert (found.name, found.version, found.read) == ("track", 2, "x time")
-    assert found.dimensions == {"time": "samples"}
+    assert found.dimensions == {"time": "samples", "body": "what floats"}
     assert found.variable("x") == Variable(
         "x", "[body] time", "m", "position x", note="NaN where it is unknown"
     )

@@ -61,12 +61,12 @@ ASSEMBLY: Final = kind(
 kind: assembly
 version: 1
 dimensions:
-    run: simulated worlds
+    run int: simulated worlds
     event: joinings in a run, in order; one less than there are blocks, at least one; where bonds \
         break, joinings, partings and bonds of loops
     side: of the assembly that stayed, of the one that was moved
     part: stayed, moved, became
-    block: blocks
+    block int: blocks
     axis: x, y
     face: faces of a block, where they are magnets
     class: every class up to 8 squares; beyond that, and of discs, those that occurred
@@ -92,8 +92,6 @@ variables:
     drag_coefficient(run) [1]: drag coefficient
     force_std(run) [N]: standard deviation of the force
     status(run) bits: problems in a run; 0 is sound
-    run int
-    block int
     {CLASS}
     shape(shape) text: shape of an assembly
 variables (blocks that are squares):
@@ -133,17 +131,15 @@ version: 1
 read: x y theta run time block
 read_attributes: block_side_m
 dimensions:
-    run: chosen runs
+    run int: chosen runs
     time: samples
-    block: blocks
+    block int: blocks
     face: faces of a block, where they are magnets
 variables:
     <x|y>({_PATH}) [m]: position <x|y> of the block's centre
     theta({_PATH}) [rad]: orientation of the block, counter-clockwise from x
     assembly({_PATH}) int: {_LOWEST}
-    run int
     time(time) [s]: time from the start of the run
-    block int
 {_POLES}attributes:
     sample_interval_s number: time between samples
 """,
@@ -188,14 +184,14 @@ CLASSIFICATION: Final = kind(
 kind: classification
 version: 1
 dimensions:
-    time: samples of the recording
-    body: bodies, by name
+    time [s]: samples of the recording
+    body text: bodies, by name
     event: joinings, at least one
     split: partings, at least one
     side: the two blocks
     part: stayed, moved, became
     class: outcome classes
-    shape: polyominoes
+    shape text: polyominoes
 variables:
     outcome(time) int: outcome class, -1 unknown; index into 'class'
     assembly(time body) int: lowest body of the assembly, -1 unknown
@@ -211,9 +207,6 @@ variables:
     split_face(split side) int: faces that came apart, as those that join; {_NOWHERE}
     <event|split>_class(<event|split>) int: outcome class after the <joinings|partings>: index \
         into 'class'; {_NOWHERE}
-    time [s]
-    body text
-    shape text
 variables (made by observe):
     possible(time class) bool: whether the class is possible; none at all: nothing is known
     hidden(time) [1] int: number of blocks that are hidden

@@ -87,7 +87,7 @@ version: 4
 read: ks_distance {grid} estimate parameter {read}
 read_attributes: study
 dimensions:
-    parameter: parameters of the model, by name
+    parameter text: parameters of the model, by name
     bound: lower, upper
     <warning|verdict_reason>: sentences
     {rows}
@@ -103,7 +103,6 @@ variables:
     estimate(parameter): estimates of the parameters; the optimum, in the units of the coordinate \
         unit
     coarse_estimate(parameter): best setting of the coarse map
-    parameter text
     unit(parameter) text: unit of the parameter
     warning(warning) text: evidence against the calibration
     {OPTIMUM}ks_distance [1]: KS distance at the optimum
@@ -198,7 +197,6 @@ _RECORDED: Final = """
     warning text
     aspect(aspect) text: aspect of the motion
     check(check) text: fact of the motion
-    parameter text
 """
 """Variables of both kinds, and their attributes."""
 _ORIGIN: Final = """
@@ -214,7 +212,7 @@ MODEL_CALIBRATION: Final = kind(f"""
 kind: model_calibration
 version: 2
 dimensions:
-    parameter: parameters of the model
+    parameter text: parameters of the model
     bound: lower and upper end
     draw: settings that could have given the recording
     profile_point: values along a parameter
@@ -279,7 +277,7 @@ dimensions:
     model: motion models, from the closest to the farthest
     aspect: aspects of the motion, by name
     check: facts of the motion that no model is fitted to
-    parameter: parameters of all the models
+    parameter text: parameters of all the models
     end: searches: the short ones, and the long one
     <finding|warning>: sentences
 variables:

@@ -14,13 +14,13 @@ read: action phase class age mode flow flow_scale force_std drag_coefficient u v
 read_attributes: target every_s blocks study safe_mode
 dimensions:
     phase: phases of the run, by the time that is left
-    class: outcome classes of the blocks
+    class text: outcome classes of the blocks
     age: bins of the time in the class
-    mode: modes of agitation
+    mode text: modes of agitation
     draw: the estimate, and draws from the uncertainty of the fits
     round: rounds of planning
     field: flow fields
-    <y|x>: nodes of the flow
+    <y|x> [m]: nodes of the flow
 variables:
     action(phase class age) int: number of the mode to choose, from 0
     flow(mode) int: number of the flow field of the mode, from 0
@@ -33,10 +33,7 @@ variables:
     <u|v>(field y x) [m s-1]: flow velocity <x|y>
     flag(field y x) int: origin of the node's value, as in a flow_field
     phase(phase) [s]: shortest time left at a decision of the phase
-    class text
     age(age) [s]: time in the class from which the bin holds
-    mode text
-    <x|y> [m]
 attributes:
     target text: outcome class to be reached
     by_s number: deadline
@@ -65,10 +62,10 @@ CONTROL_TEST: Final = kind(
 kind: control_test
 version: 1
 dimensions:
-    arm: the policy, the best constant mode, random switching
+    arm text: the policy, the best constant mode, random switching
     time: decisions, and the deadline
-    mode: modes of agitation
-    class: outcome classes of the blocks
+    mode text: modes of agitation
+    class text: outcome classes of the blocks
 variables:
     reached(arm) [1]: share of the worlds in the target at the deadline
     reached_<low|high>(arm) [1]: <lower|upper> limit of the share; exact
@@ -79,10 +76,7 @@ variables:
     class_usage(class mode) [1]: the policy's share of the time in a class; NaN in no time
     film_class(time) int: number of the class of one world under the policy
     film_mode(time) int: number of its mode from then on; -1 at the deadline
-    arm text
     time(time) [s]: time from the start
-    mode text
-    class text
 attributes:
     target text: outcome class to be reached
     by_s number: deadline

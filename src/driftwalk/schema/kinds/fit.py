@@ -15,10 +15,10 @@ kind: fit
 version: 3
 dimensions:
     flow: flows, by name, with switching times
-    <y|x>: nodes of the flow
-    component: u, v
+    <y|x> [m]: nodes of the flow
+    component text: u, v
     knot_<y|x>: knots of the spline
-    parameter: fitted parameters, by name
+    parameter text: fitted parameters, by name
     bound: lower, upper
     <warning|verdict_reason>: sentences
     criterion: criteria of the check, by name
@@ -26,7 +26,7 @@ dimensions:
     cell_<y|x>: centres of the cells of the check
     log_parameter: logarithms of the fitted parameters
     other_log_parameter: the same
-    axis: x, y
+    axis text: x, y
     switch: switching times
     profile: values of C_d, by their value
     flow_interval: between the switching times
@@ -34,7 +34,7 @@ dimensions:
     flow_mode: modes of the flow in time
     mode_time: times in a period of the modes, or of the measured frames
     strength_time: frames of the strength of the flow
-    number: numbers of departures from the model, by name
+    number text: numbers of departures from the model, by name
     law: force laws that were fitted, by name
     departure: numbers of departures that were tested, by name
     measured_<y|x>: nodes of a measured flow
@@ -82,9 +82,7 @@ variables:
     number_value(number): numbers of departures from the model; as the filter takes them, in SI \
         units
     number_opened(number) bool: whether the number was estimated
-    number text
     law(law) text: force law
-    parameter text
     unit(parameter) text: unit of the parameter
     bound(bound) text: end of an interval
     <u|v>({_ON}) [m s-1]: flow velocity <x|y>
@@ -98,14 +96,11 @@ variables:
         parameters
     profile_deviance(profile) [1]: deviance along C_d
     profile_half_log_determinant(profile) [1]: half the logarithm of the determinant along C_d
-    <x|y> [m]
-    component text
     spline_origin(axis) [m]: first knot of the splines
     spline_spacing [m]: distance between knots
     cell_size [m]: distance between nodes
     log_parameter(log_parameter) text: logarithm of a parameter
     other_log_parameter(other_log_parameter) text: logarithm of a parameter
-    axis text
     profile(profile) [1]: C_d
 variables (the model was checked):
     verdict text: whether the model explains the recordings; "explains", "does not explain" or \

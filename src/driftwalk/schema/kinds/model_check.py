@@ -29,10 +29,10 @@ kind: model_check
 version: 3
 dimensions:
     <verdict_reason|note>: sentences
-    criterion: criteria, by name
-    component: errors in x, in y, and in the angle where it is in the state
+    criterion text: criteria, by name
+    component text: errors in x, in y, and in the angle where it is in the state
     lag: samples
-    <y|x>: centres of cells
+    <y|x> [m]: centres of cells
     part: tenths of the recordings
     speed_range: ranges of the speed
     replicate: simulations at the estimate
@@ -72,10 +72,7 @@ variables:
     flow_change_std(part) [1]: its standard deviation
     drag_change(speed_range) [1]: relative change of C_d
     drag_change_std(speed_range) [1]: its standard deviation
-    criterion text
-    component text
     lag(lag) [1] int: samples
-    <x|y> [m]
     part_recording(part) int: recording of the part
     part_start(part) [s]: start of the part; from that of the recording
     part_end(part) [s]: end of the part

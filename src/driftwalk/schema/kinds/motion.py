@@ -17,14 +17,13 @@ version: 1
 read: x y theta time body
 dimensions:
     time: samples, at the union of the bodies' clocks
-    body: bodies, by name
+    body text: bodies, by name
     part: xx, xy, yy, xtheta, ytheta, thetatheta
 variables:
     x(time body) [m]: position x; the arena's centre is the origin; NaN is a gap
     y(time body) [m]: position y; y is up
     theta(time body) [rad]: orientation; counter-clockwise, in (-π, π]; NaN where it is unknown
     time(time) [s]: time; increases
-    body text
 variables (tracked videos):
     ambiguous(time body) [1]: score of the best other assignment of identities; above 0 where \
         identities could have been exchanged
@@ -71,16 +70,13 @@ kind: simulation
 version: 1
 read: x y theta time body
 dimensions:
-    replicate: simulated worlds
-    time: samples
-    body: the block or body
+    replicate int: simulated worlds
+    time [s]: samples
+    body text: the block or body
 variables:
     <x|y>(replicate time body) [m]: position <x|y>
     theta(replicate time body) [rad]: orientation; in (-π, π]; NaN where a model has none
-    time [s]
-    body text
     status(replicate) bits: problems in a world; 0 is sound
-    replicate int
 attributes:
     arena
     seed
@@ -132,7 +128,7 @@ COMPARISON: Final = kind("""
 kind: comparison
 version: 1
 dimensions:
-    motion: a, b
+    motion text: a, b
     density_<step_length|turning_angle>: bins
     <step_length|turning_angle>_edge: edges of the bins
 variables:
@@ -155,7 +151,6 @@ variables:
     <mean|median>_step_length(motion) [m]: <mean|median> step length
     std_turning_angle(motion) [rad]: standard deviation of the turning angle
     step_density(motion density_step_length density_turning_angle) [1]: fraction of steps
-    motion text
     step_length_edge(step_length_edge) [m]: edges of the step-length bins
     turning_angle_edge(turning_angle_edge) [rad]: edges of the turning-angle bins
 attributes:
@@ -170,13 +165,12 @@ REPLICATE_COMPARISON: Final = kind("""
 kind: replicate_comparison
 version: 1
 dimensions:
-    replicate: simulations of the recording
+    replicate int: simulations of the recording
 variables:
     ks_distance(replicate) [1]: KS distance of a replicate to the recording
     mean_ks_distance [1]: mean KS distance of the replicates to the recording
     noise_floor [1]: mean KS distance of two replicates
     p_value [1]: share of motions as far from the others as the recording
-    replicate int
 attributes:
     step_interval_s number: time of a step
     ties text: how points that share a coordinate are counted

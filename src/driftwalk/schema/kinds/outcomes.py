@@ -165,11 +165,11 @@ OUTCOME_POSTERIOR: Final = kind(
 kind: outcome_posterior
 version: 1
 dimensions:
-    parameter: parameters that were inferred, by name
+    parameter text: parameters that were inferred, by name
     bound: lower, upper
     point: sample of the prior
-    data: kinds of data
-    class: final outcome classes, the most frequent ones, and the rest
+    data text: kinds of data
+    class text: final outcome classes, the most frequent ones, and the rest
     node: simulated settings that the emulator learned from
     truth: simulated data sets of the self-check
     reason: sentences on what is not determined
@@ -194,10 +194,7 @@ variables:
     node_value(node parameter): parameters of the nodes
     truth_value(truth parameter): parameters of the data sets of the self-check
     reason(reason) text: what is not determined, and why
-    parameter text
     unit(parameter) text: unit of the parameter
-    data text
-    class text
 attributes:
     verdict text: determined, partly determined, or cannot tell
     used text: kind of data that the posterior is from, or none: then the sample is the prior's
@@ -223,13 +220,13 @@ KINETICS: Final = kind(
 kind: kinetics
 version: 1
 dimensions:
-    source: data sets, the first and where it was given the second
-    transition: changes of class that were seen
-    class: outcome classes that were seen
+    source text: data sets, the first and where it was given the second
+    transition text: changes of class that were seen
+    class text: outcome classes that were seen
     time: from the start of the runs to their end
-    model: candidates, the simplest first
-    test: tests of a well-mixed tank
-    reason: reasons of the verdict
+    model text: candidates, the simplest first
+    test text: tests of a well-mixed tank
+    reason text: reasons of the verdict
     bin: bins of the time since a class was entered, of the chosen model
     hidden: hidden states of the chosen model
     hidden_after: the same, after a change of class
@@ -258,13 +255,7 @@ variables:
     events(test) [1] int: sojourns that ended
     p(test) [1]: p-value; likelihood ratio of a shape, Cox's score of a memory
     p_corrected(test) [1]: p-value, corrected for the number of tests (Holm)
-    source text
-    transition text
-    class text
     time(time) [s]: time from the start of the run
-    model text
-    test text
-    reason text
 variables (two data sets):
     equal_p(transition) [1]: p-value of equal rates; log-rank of permuted runs, NaN below five \
         events

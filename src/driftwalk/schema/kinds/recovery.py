@@ -40,8 +40,8 @@ version: 1
 dimensions:
     duration: lengths of the recordings
     angle: uses of the orientation
-    recording: simulated recordings
-    parameter: drag_coefficient, force_std, tracking_noise
+    recording int: simulated recordings
+    parameter text: drag_coefficient, force_std, tracking_noise
 variables:
     flow_error({_EACH}) [1]: rms error of the flow over its rms speed; averaged over the block, \
         where it has been
@@ -77,8 +77,6 @@ variables:
         end (90 %)
     duration(duration) [s]: length of the recording
     angle(angle) text: use of the orientation
-    recording int
-    parameter text
 attributes:
     <drag_coefficient|force_std_N|force_interval_s|tracking_noise_m> number: the truth
     flow text: the true flow
@@ -108,7 +106,7 @@ kind: model_recovery
 version: 1
 dimensions:
     recording: simulated recordings
-    parameter: open parameters of the model
+    parameter text: open parameters of the model
     bound: lower and upper end
 variables:
     truth(parameter): true value of the parameter; in its unit
@@ -137,7 +135,6 @@ variables:
     scale(parameter) text: scale of the parameter: linear or log
     meaning(parameter) text: what the parameter is
     recording(recording) int: number of the recording
-    parameter text
     bound(bound) text: end of an interval
 attributes:
     model text: name of the model

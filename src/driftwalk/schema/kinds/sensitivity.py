@@ -134,7 +134,7 @@ version: 1
 dimensions:
     {_DIMENSIONS}
     class: outcome classes
-    component: principal components, counted from 1
+    component [1] int: principal components, counted from 1
 variables:
     score(... component) [1]: score of the setting
     loading(class component) [1]: loading of the class
@@ -142,7 +142,6 @@ variables:
     complete_correlation(component) [1]: correlation of the score with the share of complete runs
     mean(class) [1]: mean share over settings
     class(class) text: outcome class
-    component [1] int
 attributes:
     settings number: settings that were decomposed
     left_out number: settings that were left out
@@ -163,10 +162,9 @@ kind: sobol_design
 version: 1
 dimensions:
     setting: settings, in an order that matters
-    input: inputs, by name
+    input text: inputs, by name
 variables:
     {_DESIGN}
-    input text
 attributes:
     samples number: samples of the design, a power of two
     seed number: seed of the scrambling
@@ -179,7 +177,7 @@ kind: sobol_indices
 version: 1
 dimensions:
     output: outputs, by name; or whatever the given outputs lie along, as they name it
-    input: inputs, by name
+    input text: inputs, by name
     setting: settings of the design
 variables:
     variance(...): variance over the design; squared output
@@ -188,7 +186,6 @@ variables:
     <first|total>_order_half_width(... input) [1]: half width of its confidence interval
     <first|total>_order_corrected(... input) [1]: <first|total> order Sobol' index without \
         sampling noise
-    input text
 variables (made by sensitivity_indices):
     proportion(setting output) [1]: share of runs
     {_DESIGN}
