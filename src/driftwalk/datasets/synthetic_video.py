@@ -235,16 +235,12 @@ class _Painter:
         if settings.blur_px > 0.0:
             image = self.cv2.GaussianBlur(image, (0, 0), settings.blur_px)
         if settings.noise_std > 0.0:
-            image = image + self._noise_of(index)
+            # A stretch of the drawn noise, from a place of the frame's own.
+            generator = np.random.default_rng([settings.seed, VideoStream.IMAGE, index])
+            start = int(generator.integers(self.noise.size - image.size))
+            image = image + self.noise[start : start + image.size].reshape(image.shape)
         # Rounds, and stops at 255; what is below zero is stopped before.
         return np.asarray(self.cv2.convertScaleAbs(self.cv2.max(image, 0.0)), dtype=np.uint8)
-
-    def _noise_of(self, index: int) -> Singles:
-        """Return the noise of a frame: a stretch of the drawn noise, from its own place."""
-        size = self.tank.size
-        generator = np.random.default_rng([self.settings.seed, VideoStream.IMAGE, index])
-        start = int(generator.integers(self.noise.size - size))
-        return self.noise[start : start + size].reshape(self.tank.shape)
 
     def visible(self, index: int) -> Floats:
         """Return the share of each marker that can be seen in a frame, shape (bodies,)."""

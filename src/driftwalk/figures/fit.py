@@ -72,10 +72,7 @@ def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
     x, y = (in_unit(flow[axis], "cm", stored="m") for axis in ("x", "y"))
     # A few nodes at the rim, hardly visited, would make all others pale.
     top = float(np.nanquantile(shown, 0.98)) if np.isfinite(shown).any() else 1.0
-    mesh = ax.pcolormesh(
-        x, y, shown, cmap=style.speed_colormap(), vmin=0.0, vmax=top, shading="nearest"
-    )
-    mesh.set_rasterized(True)
+    mesh = style.speed_mesh(ax, x, y, shown, top)
     outline = draw_arena(ax, arena_of(flow, None))
     if outline is not None:
         mesh.set_clip_path(outline)

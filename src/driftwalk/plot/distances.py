@@ -166,7 +166,7 @@ def edges_of(calibration: xr.Dataset, *, prefix: str) -> tuple[Floats, Floats]:
     edges = []
     for one in plane_of(calibration):
         center = one.values(calibration, prefix)
-        is_log = one.stored.is_log
+        is_log = one.stored.scale == "log"
         edges.append(10.0 ** cell_edges(np.log10(center)) if is_log else cell_edges(center))
     return edges[0], edges[1]
 

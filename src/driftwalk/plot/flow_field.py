@@ -89,10 +89,7 @@ def plot_flow(
     top = 100.0 * (top_speed(flow, field) if speed_limit is None else speed_limit)
     tank = arena_of(flow, arena)
     shown, hatched = (speed, filled) if tank is None else _to_the_wall(speed, filled, flag)
-    mesh = ax.pcolormesh(
-        x, y, shown, cmap=style.speed_colormap(), vmin=0.0, vmax=top or 1.0, shading="nearest"
-    )
-    mesh.set_rasterized(True)
+    mesh = style.speed_mesh(ax, x, y, shown, top or 1.0)
     drawn = [mesh, *_hatch_cells(ax, x, y, hatched), *_draw_arrows(ax, x, y, u, v, filled)]
     outline = draw_arena(ax, tank)
     if outline is not None:

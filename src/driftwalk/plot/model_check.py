@@ -248,10 +248,7 @@ def _draw_means(ax: Axes, check: xr.Dataset) -> None:
     distance = check["residual_distance"].values
     limit = float(check["residual_distance"].attrs["limit"])
     top = max(LEAST_TOP, float(np.nanmax(distance, initial=0.0)))
-    mesh = ax.pcolormesh(
-        x, y, distance, cmap=style.speed_colormap(), vmin=0.0, vmax=top, shading="nearest"
-    )
-    mesh.set_rasterized(True)
+    mesh = style.speed_mesh(ax, x, y, distance, top)
     u, v = check["residual"].values[:2]
     known = np.isfinite(distance)
     # As long as the error is far from zero: a mean of few samples is large by chance.

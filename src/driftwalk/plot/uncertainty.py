@@ -200,7 +200,7 @@ def _histogram(calibration: xr.Dataset, ax: Axes, parameter: PlotParameter) -> N
     if ends is not None:
         low, high = (parameter.factor * end for end in ends)
         ax.axvspan(low, high, color=style.PALE, lw=0, label="interval")
-    is_log = parameter.stored.is_log
+    is_log = parameter.stored.scale == "log"
     # Counted on the scale of the axis: an edge that was raised to a power may leave its value out.
     counts, bins = np.histogram(np.log10(values) if is_log else values, "auto")
     edges = np.power(10.0, bins) if is_log else bins

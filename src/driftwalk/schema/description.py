@@ -63,11 +63,6 @@ class Variable:
         """Dimensions that it has at most, apart from free ones."""
         return tuple(one.strip("[]") for one in self.dims.split() if one != FREE)
 
-    @property
-    def optional_dims(self) -> frozenset[str]:
-        """Those of them that may be absent."""
-        return frozenset(one[1:-1] for one in self.dims.split() if one.startswith("["))
-
     def lies_on(self, dims: tuple[str, ...]) -> bool:
         """Return whether these are its dimensions.
 
@@ -77,8 +72,8 @@ class Variable:
         >>> u.lies_on(("y", "x")), u.lies_on(("x", "y"))
         (True, False)
         """
-        absent = self.optional_dims - set(dims)
-        expected = tuple(one for one in self.fixed_dims if one not in absent)
+        said = self.dims.split()
+        expected = tuple(one for one in self.fixed_dims if one in dims or f"[{one}]" not in said)
         if self.dims.startswith(FREE):
             return dims[len(dims) - len(expected) :] == expected
         return dims == expected
@@ -256,8 +251,9 @@ def kind(
 
         A head may say in brackets when its rows are there. A variable with its name alone is a
         coordinate that is called as it is named, which a row of its dimension may say too
-        (``name [units] int: words``); an attribute with its name alone is one of `COMMON`. A row with choices in angle brackets, ``<low|high>``, stands for two rows: one
-        with all the first words, one with all the second ones.
+        (``name [units] int: words``); an attribute with its name alone is one of `COMMON`. A row
+        with choices in angle brackets, ``<low|high>``, stands for two rows: one with all the first
+        words, one with all the second ones.
     *more : Variable or Attribute
         Further ones.
     flags : mapping

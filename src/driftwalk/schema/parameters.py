@@ -212,11 +212,6 @@ class StoredParameter(NamedTuple):
         """Flat name of its estimate: its name with the unit."""
         return flat_name(self.name, self.unit)
 
-    @property
-    def is_log(self) -> bool:
-        """Whether equal steps along it are equal ratios."""
-        return self.scale == "log"
-
 
 def stored_parameters(calibration: xr.Dataset) -> tuple[StoredParameter, ...]:
     """Return the parameters of a calibration, in the order of its dimensions.

@@ -208,7 +208,7 @@ class PlotParameter:
 
     def scale(self, ax: Axes, which: Literal["x", "y"]) -> None:
         """Give an axis of a figure that has its limits the parameter's scale."""
-        if self.stored.is_log:
+        if self.stored.scale == "log":
             logarithmic(ax, which)
 
 

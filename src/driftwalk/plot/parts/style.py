@@ -22,6 +22,7 @@ from driftwalk.core.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import QuadMesh
     from matplotlib.colorbar import Colorbar
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
@@ -223,6 +224,13 @@ def speed_colormap() -> Colormap:
     from matplotlib.colors import ListedColormap
 
     return ListedColormap(colormaps["Blues"](np.linspace(0.06, 0.68, 256)), name="light_blues")
+
+
+def speed_mesh(ax: Axes, x: Floats, y: Floats, values: Floats, top: float) -> QuadMesh:
+    """Draw values at nodes from light to middle blue, the darkest at the top and beyond."""
+    mesh = ax.pcolormesh(x, y, values, cmap=speed_colormap(), vmin=0.0, vmax=top, shading="nearest")
+    mesh.set_rasterized(True)
+    return mesh
 
 
 def add_colorbar(

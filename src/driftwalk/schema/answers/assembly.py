@@ -13,6 +13,7 @@ import numpy as np
 
 from driftwalk.core.units import in_percent
 from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each, interval_cells
+from driftwalk.schema.kinds.assembly import ATTRACTION
 from driftwalk.schema.kinds.flow import flow_series_words
 from driftwalk.schema.shapes import short_class
 
@@ -35,11 +36,6 @@ _SETTINGS: Final = (
     *("confidence", "blocks", "duration_s", "seed", "latching", "hidden_face_drag", "chirality"),
     *("drag_coefficient", "force_std_N", "force_interval_s"),
     *("first_contact_median_s", "completion_median_s"),
-)
-
-_ATTRACTION: Final = (
-    *("between", "force_at_contact_N", "force_at_10mm_N", "binding_energy_J"),
-    *("most_simulated_N", "capped_below_m"),
 )
 
 
@@ -124,7 +120,8 @@ def assembly_answer(
         **(apart or {}),
     }
     if attraction is not None:
-        answer["attraction"] = {key: attraction.attrs[key] for key in _ATTRACTION}
+        said = [one.name for one in ATTRACTION.attributes if one.name != "study"]
+        answer["attraction"] = {key: attraction.attrs[key] for key in said}
     return Answer(
         parts,
         answer,

@@ -35,12 +35,13 @@ class RunKind:
         Attribute ``kind`` of its result, and the key ``kind`` of its specification.
     title : str
         Title of its page.
-    under_way : str
-        Title of its live page before the run has finished.
     words : str
         Name of its result in a sentence.
     page : callable or str
         Returns the sections of its page.
+    under_way : str
+        Title of its live page before the run has finished; default: "A calibration under way" of
+        "calibration".
     command : str
         The command that makes such a run; default: the name.
     file : str
@@ -73,9 +74,9 @@ class RunKind:
 
     name: str
     title: str
-    under_way: str
     words: str
     page: Maker
+    under_way: str = ""
     command: str = ""
     file: str = ""
     datasets: tuple[str, ...] = ()
@@ -91,6 +92,7 @@ class RunKind:
     no_draws: str = "no uncertainty of its values, as a fit or a calibration has"
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "under_way", self.under_way or f"A {self.words} under way")
         object.__setattr__(self, "command", self.command or self.name)
         object.__setattr__(self, "file", self.file or f"{self.name}.nc")
 
@@ -123,7 +125,6 @@ BUILT_IN: Final = (
     RunKind(
         name="calibration",
         title="Calibration",
-        under_way="A calibration under way",
         words="calibration",
         command="calibrate",
         datasets=("flow", "recording"),
@@ -141,7 +142,6 @@ BUILT_IN: Final = (
     RunKind(
         name="fit",
         title="Likelihood fit",
-        under_way="A fit under way",
         words="fit",
         datasets=("flow", "recording", "check"),
         figures="driftwalk.runs.fit:figures_of_fit",
@@ -188,7 +188,6 @@ BUILT_IN: Final = (
     RunKind(
         name="sensitivity",
         title="Sensitivity of self-assembly",
-        under_way="A sensitivity analysis under way",
         words="sensitivity analysis",
         datasets=("reference", "components", "sobol"),
         figures="driftwalk.figures.assembly:sensitivity_figures",
@@ -276,7 +275,6 @@ BUILT_IN: Final = (
     RunKind(
         name="control_test",
         title="Test of control",
-        under_way="A test of control under way",
         words="test of control",
         command="control test",
         datasets=("path",),
@@ -290,7 +288,6 @@ BUILT_IN: Final = (
     RunKind(
         name="recovery",
         title="Recovery study",
-        under_way="A recovery study under way",
         words="recovery study",
         command="study recover",
         figures="driftwalk.figures.recovery:recovery_figures",
@@ -317,7 +314,6 @@ BUILT_IN: Final = (
     RunKind(
         name="model_calibration",
         title="Calibration of a motion model",
-        under_way="A calibration under way",
         words="calibration",
         command="calibrate",
         datasets=("recording", "flow"),
@@ -332,7 +328,6 @@ BUILT_IN: Final = (
     RunKind(
         name="model_recovery",
         title="Recovery study of a motion model",
-        under_way="A recovery study under way",
         words="recovery study",
         command="study recover",
         figures="driftwalk.figures.recovery:model_recovery_figures",
