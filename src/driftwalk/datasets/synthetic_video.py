@@ -118,8 +118,7 @@ def video_truth(trajectory: xr.Dataset, settings: VideoSettings | None = None) -
     [1.0, 1.0]
     """
     painter = _Painter(trajectory, settings if settings is not None else VideoSettings())
-    poses = painter.poses
-    pixels = world_to_image(painter.settings, poses[..., :2])
+    pixels = world_to_image(painter.settings, painter.poses[..., :2])
     visible = np.stack([painter.visible(index) for index in range(painter.time.size)])
     where = ("time", "body")
     return trajectory.assign(
@@ -291,8 +290,7 @@ class _Painter:
             total += self._shapes(index, body, world, at, scale)
         total /= len(moments)
         height, width = rows.stop - rows.start, columns.stop - columns.start
-        means = total.reshape(4, height, _FINE, width, _FINE).mean(axis=(2, 4))
-        return list(means)
+        return list(total.reshape(4, height, _FINE, width, _FINE).mean(axis=(2, 4)))
 
     def _shapes(self, index: int, body: int, world: Singles, pose: Floats, scale: float) -> Singles:
         settings = self.settings

@@ -193,8 +193,7 @@ def sensitivity_figures(
 
 def _planes(sensitivity: xr.Dataset) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the parts of a study that have two axes or fewer: their folder, and what to select."""
-    axes = [str(name) for name in sensitivity["l1_distance"].dims]
-    fixed = axes[:-2]
+    fixed = [str(name) for name in sensitivity["l1_distance"].dims[:-2]]
     for values in product(*(sensitivity[name].values.tolist() for name in fixed)):
         chosen = dict(zip(fixed, values, strict=True))
         name = "_".join(f"{name}_{value}" for name, value in chosen.items())

@@ -69,8 +69,7 @@ def calibration_figures(
 
 def flow_figure(flow: xr.Dataset) -> Figure:
     """Return Fig. 2: the block's velocity next to the water's, or the water's alone."""
-    has_block = all(name in flow for name in COMPONENTS["block"])
-    if not has_block:
+    if any(name not in flow for name in COMPONENTS["block"]):
         ax = plot_flow(flow, style.axes_or_new(None, height_mm=78.0, layout="compressed"))
         if _is_filled(ax):
             ax.set_title("hatched: filled, not measured", loc="left")
@@ -110,10 +109,9 @@ def trajectory_figure(trajectory: xr.Dataset, *, body: str | None = None) -> Fig
 
 def steps_figure(calibration: xr.Dataset) -> Figure:
     """Return Fig. 5b: the recording's steps with their marginals."""
-    ax = style.axes_or_new(None, height_mm=76.0)
     length = calibration["recording_step_length"].values
     angle = calibration["recording_turning_angle"].values
-    return style.figure_of(plot_steps(length, angle, ax))
+    return style.figure_of(plot_steps(length, angle, style.axes_or_new(None, height_mm=76.0)))
 
 
 def ks_map_figure(calibration: xr.Dataset) -> Figure:
@@ -139,10 +137,8 @@ def ks_map_figure(calibration: xr.Dataset) -> Figure:
 
 def panels_figure(calibration: xr.Dataset, parameter: str) -> Figure:
     """Return the densities along a parameter: Fig. 7 (drag coefficient), Fig. 8 (force)."""
-    row = plot_density_panels(calibration, parameter=parameter)
-    figure = style.figure_of(row[0])
-    shared = shared_setting_text(calibration, parameter=parameter)
-    if shared:
+    figure = style.figure_of(plot_density_panels(calibration, parameter=parameter)[0])
+    if shared := shared_setting_text(calibration, parameter=parameter):
         figure.suptitle(f"simulated with {shared}")
     return figure
 

@@ -73,8 +73,7 @@ def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
     # A few nodes at the rim, hardly visited, would make all others pale.
     top = float(np.nanquantile(shown, 0.98)) if np.isfinite(shown).any() else 1.0
     mesh = style.speed_mesh(ax, x, y, shown, top)
-    outline = draw_arena(ax, arena_of(flow, None))
-    if outline is not None:
+    if (outline := draw_arena(ax, arena_of(flow, None))) is not None:
         mesh.set_clip_path(outline)
     label_position(ax)
     beyond = bool(np.nanmax(shown, initial=0.0) > top)
@@ -229,8 +228,7 @@ def plot_laws(fit: xr.Dataset, ax: Axes) -> Axes:
     ax.set_yticks(place, names)
     ax.set(ylim=(-0.6, len(names) - 0.4), xlabel="loss per sample, against the best law (nats)")
     ax.set_title("held out samples; bars: standard error", loc="left")
-    unsolved = len(every) - len(known)
-    if unsolved:
+    if unsolved := len(every) - len(known):
         ax.set_title(f"not shown, without a solution: {unsolved}", loc="right")
     return ax
 

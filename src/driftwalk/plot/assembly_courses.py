@@ -400,8 +400,7 @@ def plot_growth(
         ):
             # Dashes are named once, and then the colour of the second one.
             named = words if len(curves) > 1 and one is sizes else ""
-            first = name == next(iter(curves))
-            text = named or (label if first else "")
+            text = named or (label if name == next(iter(curves)) else "")
             ax.plot(one["time"], one[name], color=color, ls=dashes, lw=1.3, label=text or None)
             ends = (one[f"{name}_low"].values, one[f"{name}_high"].values)
             ax.fill_between(one["time"].values, *ends, color=color, alpha=0.2, lw=0)

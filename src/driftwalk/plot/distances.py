@@ -119,8 +119,7 @@ def plot_refined_map(
     mesh, score = _draw_scores(ax, calibration, prefix="refined_")
     if np.isfinite(score).any():
         low, high = np.nanquantile(score, [0.02, 1.0])
-        floor = 1.0 - number_fact(calibration, "noise_floor")
-        high = np.nanmax([high, floor])
+        high = np.nanmax([high, 1.0 - number_fact(calibration, "noise_floor")])
         mesh.set_clim(low, high + 0.06 * (high - low))
     across, up = plane_of(calibration)
     dims = (f"refined_{up.name}", f"refined_{across.name}")
@@ -211,8 +210,7 @@ def draw_region(ax: Axes, calibration: xr.Dataset, **look: Any) -> None:
     """Outline the 90 % region of the estimate, where there is one."""
     from matplotlib.patches import Polygon
 
-    outline = region_of(calibration)
-    if outline is not None:
+    if (outline := region_of(calibration)) is not None:
         ax.add_patch(
             Polygon(
                 outline, closed=True, facecolor="none", edgecolor=style.INK, label=REGION_LABEL,

@@ -216,8 +216,7 @@ def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[
     trails = LineCollection([], colors=style.MUTED, linewidths=0.8, alpha=0.7, zorder=2)
     bars = empty_bars()
     count = scene.place.shape[1]
-    edge = style.edge_width(count)
-    bodies = PolyCollection([], edgecolors=style.INK, linewidths=edge, zorder=3)
+    bodies = PolyCollection([], edgecolors=style.INK, linewidths=style.edge_width(count), zorder=3)
     pointers = LineCollection([], colors=style.INK, linewidths=0.9, zorder=4)
     clock = figure.text(0.04, 0.955, "", size=9.0, va="center")
     artists = (trails, bodies, bars, pointers)

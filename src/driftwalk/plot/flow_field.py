@@ -91,8 +91,7 @@ def plot_flow(
     shown, hatched = (speed, filled) if tank is None else _to_the_wall(speed, filled, flag)
     mesh = style.speed_mesh(ax, x, y, shown, top or 1.0)
     drawn = [mesh, *_hatch_cells(ax, x, y, hatched), *_draw_arrows(ax, x, y, u, v, filled)]
-    outline = draw_arena(ax, tank)
-    if outline is not None:
+    if (outline := draw_arena(ax, tank)) is not None:
         # Cells at the wall reach over it by up to a cell; what is drawn ends at the wall.
         for artist in drawn:
             artist.set_clip_path(outline)
@@ -198,8 +197,7 @@ def _draw_arrows(
         (~filled[thin], style.INK, "measured"),
         (filled[thin], style.MUTED, "filled"),
     ):
-        here = shown & chosen
-        if here.any():
+        if (here := shown & chosen).any():
             drawn.append(
                 ax.quiver(
                     *(part[thin][here] for part in grid),

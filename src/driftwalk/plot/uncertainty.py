@@ -99,8 +99,7 @@ def plot_distance_profile(
     line = through_optimum(calibration, along)
     values = factor * np.asarray(line[along.name].values, dtype=np.float64)
     ax = style.axes_or_new(ax)
-    interval = interval_of(calibration, f"{along.key}_interval")
-    if interval is not None:
+    if (interval := interval_of(calibration, f"{along.key}_interval")) is not None:
         ax.axvspan(
             factor * interval[0], factor * interval[1], color=style.PALE, lw=0, label="interval"
         )
@@ -196,8 +195,7 @@ def _cloud(calibration: xr.Dataset, ax: Axes) -> None:
 
 def _histogram(calibration: xr.Dataset, ax: Axes, parameter: PlotParameter) -> None:
     values = parameter.values(calibration, "bootstrap_")
-    ends = interval_of(calibration, f"{parameter.key}_interval")
-    if ends is not None:
+    if (ends := interval_of(calibration, f"{parameter.key}_interval")) is not None:
         low, high = (parameter.factor * end for end in ends)
         ax.axvspan(low, high, color=style.PALE, lw=0, label="interval")
     is_log = parameter.stored.scale == "log"

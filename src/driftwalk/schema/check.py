@@ -29,8 +29,7 @@ def kind_of_dataset(dataset: xr.Dataset) -> Kind:
     InputError
         When it says none, or one that is not known.
     """
-    kind = find_kind(dataset)
-    if kind is not None:
+    if (kind := find_kind(dataset)) is not None:
         return kind
     name = kind_name(dataset)
     if name is None:

@@ -223,8 +223,7 @@ def body_track(dataset: xr.Dataset, body: str | None = None) -> Track:
     index = names.index(body)
     x, y, theta = (dataset[name].values[:, index] for name in POSE)
     present = np.isfinite(x) & np.isfinite(y)
-    time = dataset["time"].values
-    return Track(time[present], x[present], y[present], theta[present])
+    return Track(dataset["time"].values[present], x[present], y[present], theta[present])
 
 
 def _columns(values: npt.ArrayLike) -> Floats:

@@ -50,7 +50,7 @@ def test_parameters_are_read_from_the_dimensions():
     stored = stored_parameters(two_parameters())
     assert [one.key for one in stored] == ["speed_m_s", "tumble_rate_per_s"]
     assert [one.label for one in stored] == ["speed", "rate of tumbles"]
-    assert [one.is_log for one in stored_parameters(one_parameter())] == [True]
+    assert [one.scale for one in stored_parameters(one_parameter())] == ["log"]
 
 
 @pytest.mark.parametrize(

@@ -201,8 +201,7 @@ def axes_points(ax: Axes) -> Floats:
 def settle_layout(ax: Axes) -> None:
     """Give axes the size that they will have, so that sizes and places in points stay true."""
     figure = figure_of(ax)
-    engine = figure.get_layout_engine()
-    if engine is not None:
+    if (engine := figure.get_layout_engine()) is not None:
         engine.execute(figure)
 
 

@@ -165,8 +165,7 @@ def _of_flows(fit: xr.Dataset, first: Estimate) -> list[Estimate]:
 def checked_parts(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
     """Return what was found after the estimates: compared laws, the wall, the check."""
     parts: list[Part] = []
-    laws = compared_laws(fit)
-    if laws:
+    if laws := compared_laws(fit):
         rows = [
             [law.name, f"{law.loss:.4f} ± {law.std:.4f}", f"{abs(law.evidence):.1f}"]
             if law.solved

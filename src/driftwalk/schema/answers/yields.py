@@ -146,8 +146,7 @@ def more_runs(found: xr.Dataset) -> int | None:
 
 def after_yield(found: xr.Dataset) -> Following:
     """Return what comes after a yield: distinguish the settings, or doubt the model."""
-    more = more_runs(found)
-    if more is not None:
+    if (more := more_runs(found)) is not None:
         return Following(
             advice=f"Distinguish the settings: the same command with {more} runs that choose"
         )
@@ -169,8 +168,7 @@ def setting_table(found: xr.Dataset) -> Table:
         rows.append([words, *numbers, standing.replace("alike", "cannot be distinguished")])
     share_words = f"{in_percent(found.attrs['confidence'])} interval"
     columns = ["setting", "yield", share_words, "share in the choosing runs", "runs", "standing"]
-    left = len(order) - LISTED
-    title = f"the best {LISTED} of {len(order)} settings" if left > 0 else ""
+    title = f"the best {LISTED} of {len(order)} settings" if len(order) > LISTED else ""
     return Table(rows, columns, title)
 
 

@@ -53,8 +53,7 @@ def refuse_endless_texts(path: Path) -> None:
     >>> refuse_endless_texts(Path(str(data / "recording.csv")))
     """
     state = path.stat()
-    damage = _damage(path, state.st_size, state.st_mtime_ns)
-    if damage:
+    if damage := _damage(path, state.st_size, state.st_mtime_ns):
         raise FormatError(f"is damaged: {damage}", path=path)
 
 

@@ -103,14 +103,13 @@ def text_attribute(path: Path, name: str) -> str | None:
     name : str
         Name of the attribute.
     """
+    value: Any = None
     try:
         if file_start(path).startswith(HDF5):
             value = _attribute_of_hdf5(path, name)
         elif is_netcdf(path):
             with _opened(path) as dataset:
                 value = dataset.attrs.get(name)
-        else:
-            value = None
     except FormatError:
         return None
     return value if isinstance(value, str) else None
