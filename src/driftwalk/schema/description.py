@@ -252,8 +252,8 @@ def kind(
         A head may say in brackets when its rows are there. A variable with its name alone is a
         coordinate that is called as it is named, which a row of its dimension may say too
         (``name [units] int: words``); an attribute with its name alone is one of `COMMON`. A row
-        with choices in angle brackets, ``<low|high>``, stands for two rows: one with all the first
-        words, one with all the second ones.
+        with choices in angle brackets, ``<low|high>``, stands for as many rows: one with all the
+        first words, one with all the second ones, and so on.
     *more : Variable or Attribute
         Further ones.
     flags : mapping

@@ -216,8 +216,7 @@ attributes:
     block_side_m number: side of a block
     join_distance_m number: how near faces come to be joined
     join_angle_rad number: how parallel faces are when joined
-    release_distance_m number: how far faces go when they part
-    release_angle_rad number: how far faces turn when they part
+    release_<distance_m|angle_rad> number: how far faces <go|turn> when they part
     min_duration_s number: how long a joining lasts at least
     hold_s number: how long a pose holds without a sample
     play_m number: how far joined faces may move against each other

@@ -155,8 +155,7 @@ variables (200 pairs of steps or more):
         steady
 attributes:
     recording_name text: name of the recording
-    simulated_recording
-    study
+    <simulated_recording|study>
 {more}
 """,
         *_axes(parameters, "", ""),
@@ -202,10 +201,7 @@ _RECORDED: Final = """
 _ORIGIN: Final = """
     step_interval_s number: time between the positions of a step
     duration_s number: length of the recording
-    seed
-    arena
-    source
-    simulated_recording
+    <seed|arena|source|simulated_recording>
 """
 
 MODEL_CALIBRATION: Final = kind(f"""

@@ -50,9 +50,7 @@ attributes:
     safe_mode text: best mode alone, and that of a stream that stops
     blocks number: blocks in the tank
     block_side_m number: side of a block
-    arena
-    study
-    seed
+    <arena|study|seed>
 """,
     *SOURCE_WARNINGS,
 )

@@ -97,8 +97,7 @@ variables:
     profile_deviance(profile) [1]: deviance along C_d
     profile_half_log_determinant(profile) [1]: half the logarithm of the determinant along C_d
     spline_origin(axis) [m]: first knot of the splines
-    spline_spacing [m]: distance between knots
-    cell_size [m]: distance between nodes
+    <spline_spacing|cell_size> [m]: distance between <knots|nodes>
     log_parameter(log_parameter) text: logarithm of a parameter
     other_log_parameter(other_log_parameter) text: logarithm of a parameter
     profile(profile) [1]: C_d
@@ -232,10 +231,7 @@ attributes:
     drag_law text: how the drag goes with the speed: "quadratic", "linear", "mixed" of both, or \
         "power"
     drag_law_stated text: "yes" where the fit tried no other, else "no"
-    simulated_recording
-    arena
-    source
-    study
+    <simulated_recording|arena|source|study>
 attributes (a measured flow was given):
     measured_flow text: its source
     measured_flow_errors text: where its errors are from

@@ -97,11 +97,8 @@ attributes:
     cell_size_m number: size of a cell
     replicates number: simulated recordings of either set
     seed number: their seed
-    ks_distance number: median of ks_to_estimate, NaN without it
-    ks_noise_floor number: median of ks_floor, NaN without it
-    arena
-    source
-    simulated_recording
+    <ks_distance|ks_noise_floor> number: median of <ks_to_estimate|ks_floor>, NaN without it
+    <arena|source|simulated_recording>
 attributes ({_COMPARED}):
     ks_distance_interval numbers: [low, high] of the replicates
     ks_noise_floor_upper number: its 95 % quantile

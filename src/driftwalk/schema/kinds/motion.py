@@ -78,9 +78,7 @@ variables:
     theta(replicate time body) [rad]: orientation; in (-π, π]; NaN where a model has none
     status(replicate) bits: problems in a world; 0 is sound
 attributes:
-    arena
-    seed
-    study
+    <arena|seed|study>
 attributes (the block):
     drag_coefficient number: drag coefficient C_d
     force_std_N number: standard deviation σ_F of the force
@@ -133,8 +131,7 @@ dimensions:
     <step_length|turning_angle>_edge: edges of the bins
 variables:
     ks_distance [1]: KS distance
-    ks_distance_a [1]: KS distance, origins in a
-    ks_distance_b [1]: KS distance, origins in b
+    ks_distance_<a|b> [1]: KS distance, origins in <a|b>
     score [1]: 1 - KS distance
     ks_step_length [m]: step length at which the KS maximum sits
     ks_turning_angle [rad]: turning angle at which the KS maximum sits

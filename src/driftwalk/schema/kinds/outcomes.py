@@ -206,8 +206,7 @@ attributes:
     node_runs number: simulated runs of a node
     truths number: data sets of the self-check
     confidence number: of intervals and regions
-    seed
-    study
+    <seed|study>
 """,
     *SOURCE_WARNINGS,
 )

@@ -146,9 +146,7 @@ attributes:
     position_noise_m number: true noise of the recorded positions
     noise text: whether the calibrations estimated it: estimated, or known
     confidence number: of the intervals
-    arena
-    source
-    study
+    <arena|source|study>
 """,
     flags={"status": _statuses("calibrated", "not_calibrated")},
 )

@@ -240,8 +240,7 @@ attributes:
     reported_runs number: fresh runs, of all settings
     left_out number: runs that broke down, which count as without the target
     duration_s number: length of a run
-    seed
-    study
+    <seed|study>
 attributes (their number does not vary):
     blocks number: blocks in the tank
 """,
