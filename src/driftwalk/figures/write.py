@@ -201,13 +201,9 @@ def write_drawn_data(figure: Figure, path: Path) -> None:
 
 def _axes_of(figure: Figure) -> list[Axes]:
     """Return the axes of a figure and those inside others, such as insets."""
-    found: list[Axes] = []
-    waiting: list[Any] = list(figure.axes)
-    while waiting:
-        ax = waiting.pop(0)
-        if ax not in found:
-            found.append(ax)
-            waiting += list(ax.child_axes)
+    found: list[Any] = list(figure.axes)
+    for ax in found:  # those that are found on the way have their turn
+        found += [inside for inside in ax.child_axes if inside not in found]
     return found
 
 

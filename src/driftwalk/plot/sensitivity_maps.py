@@ -92,7 +92,7 @@ def plot_l1_map(
     if len(sweep) == 1 or any(axis.words for axis in sweep):
         ax = style.axes_or_new(ax, height_mm=65.0)
         _draw_floor_band(ax, sensitivity, sweep)
-        _draw_lines(ax, sweep, distance, color=style.BLUE)
+        _draw_lines(ax, sweep, distance)
         _mark_missing(ax, sweep, distance)
         _mark_on_line(ax, sensitivity, sweep)
         _scale_values(ax, sweep, label=DISTANCE_LABEL)
@@ -160,7 +160,7 @@ def plot_class_panels(
     if unknown or not shown:
         raise InputError(f"the study has no class {', '.join(unknown) or '(none was asked for)'}")
     columns = min(columns, len(shown))
-    words = _along(sweep).words
+    words = sweep[0].words
     # A word has 6 mm, a panel of numbers 32 mm; 8 mm are for the title of a panel.
     row_mm = 8.0 + (6.0 * (len(words) + 1) if words else 32.0)
     panels = style.axes_grid_or_new(
@@ -177,7 +177,7 @@ def plot_class_panels(
             mesh.set_clim(0.0, top)
             _mark_on_map(ax, sensitivity, sweep, size=6.0)
         else:
-            _draw_lines(ax, sweep, proportion, color=style.BLUE)
+            _draw_lines(ax, sweep, proportion)
             _mark_on_line(ax, sensitivity, sweep)
             _scale_values(ax, sweep, label=SHARE_LABEL, top=1.05 * top)
         _title_panel(ax, name, discs=are_discs(*class_names(sensitivity)))
@@ -262,13 +262,14 @@ def shown_classes(sensitivity: xr.Dataset) -> list[str]:
 
 
 def _one_or_two(sensitivity: xr.Dataset, variable: xr.DataArray) -> list[SweepAxis]:
+    """Return the axes of a figure; points lie along the first, one of numbers if there is one."""
     sweep = sweep_axes(variable, sensitivity)
     if not 1 <= len(sweep) <= 2:
         raise InputError(
             f"the study has {len(sweep)} axes ({', '.join(axis.name for axis in sweep)}): select "
             "values along all but two, such as study.sel(latching='collision')"
         )
-    return sweep
+    return sorted(sweep, key=lambda axis: bool(axis.words))
 
 
 def _values(variable: xr.DataArray, sweep: list[SweepAxis]) -> Floats:
@@ -314,14 +315,8 @@ def _mark_on_map(
         )  # fmt: skip
 
 
-def _along(sweep: list[SweepAxis]) -> SweepAxis:
-    """Return the axis along which points lie: one of numbers, if there is one."""
-    return next((axis for axis in sweep if not axis.words), sweep[0])
-
-
 def _draw_floor_band(ax: Axes, sensitivity: xr.Dataset, sweep: list[SweepAxis]) -> None:
-    words = _along(sweep).words
-    span, line = (ax.axvspan, ax.axvline) if words else (ax.axhspan, ax.axhline)
+    span, line = (ax.axvspan, ax.axvline) if sweep[0].words else (ax.axhspan, ax.axhline)
     high = number_fact(sensitivity, "noise_floor_95")
     mean = number_fact(sensitivity, "noise_floor_mean")
     if np.isfinite(high):
@@ -330,22 +325,19 @@ def _draw_floor_band(ax: Axes, sensitivity: xr.Dataset, sweep: list[SweepAxis]) 
         line(mean, color=style.INK, lw=0.8, dashes=(4, 2.5), label="mean noise floor")
 
 
-def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Floats, *, color: str) -> None:
+def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Floats) -> None:
     """Draw values over one axis, one line per value of the other.
 
     Words have a row each, where they have room, and are not joined.
     """
-    along = _along(sweep)
-    others = [axis for axis in sweep if axis is not along]
-    if along is not sweep[0]:
-        values = values.T
+    along, *others = sweep
     look: dict[str, Any] = {"ms": 3.5, "ls": "none" if along.words else "-", "clip_on": False}
 
     def draw(at: Floats, value: Floats, **more: Any) -> None:
         ax.plot(*((value, at) if along.words else (at, value)), **look, **more)
 
     if not others:
-        draw(along.values, values, marker="o", color=color)
+        draw(along.values, values, marker="o", color=style.BLUE)
     else:
         other = others[0]
         texts = other.words or [f"{value:.4g}" for value in other.values]
@@ -370,7 +362,7 @@ def _scale_values(
     ax: Axes, sweep: list[SweepAxis], *, label: str, top: float | None = None
 ) -> None:
     """Name the axis of the values of `_draw_lines`, and begin it at 0."""
-    if _along(sweep).words:
+    if sweep[0].words:
         ax.set(xlim=(0.0, top), xlabel=label)
     else:
         ax.set(ylim=(0.0, top), ylabel=label)
@@ -378,22 +370,19 @@ def _scale_values(
 
 def _mark_missing(ax: Axes, sweep: list[SweepAxis], values: Floats) -> None:
     """Mark where no line has a value."""
-    along = _along(sweep)
-    others = tuple(place for place, axis in enumerate(sweep) if axis is not along)
-    at = along.values[~np.isfinite(values).any(axis=others)]
+    at = sweep[0].values[~np.isfinite(values).any(axis=tuple(range(1, values.ndim)))]
     if at.size:
         zero = np.zeros(at.size)
         ax.plot(
-            *((zero, at) if along.words else (at, zero)), "x", ms=3.5, color=style.MUTED,
+            *((zero, at) if sweep[0].words else (at, zero)), "x", ms=3.5, color=style.MUTED,
             clip_on=False, label="no distance",
         )  # fmt: skip
 
 
 def _mark_on_line(ax: Axes, sensitivity: xr.Dataset, sweep: list[SweepAxis]) -> None:
-    along = _along(sweep)
-    at = reference_value(sensitivity, along)
+    at = reference_value(sensitivity, sweep[0])
     if np.isfinite(at):
-        line = ax.axhline if along.words else ax.axvline
+        line = ax.axhline if sweep[0].words else ax.axvline
         line(at, color=style.INK, lw=0.7, zorder=1, label=REFERENCE_LABEL)
 
 

@@ -180,10 +180,10 @@ def _sweep_axis(name: str, dataset: xr.Dataset) -> SweepAxis:
     label = number_label(number)
     if name == "force_std" and "force_interval_s" in dataset.attrs:
         label = force_label(dataset)
+    values = np.asarray(coordinate.values, dtype=np.float64)
     if number.factor != 1.0:
         values = in_unit(coordinate, number.reader_unit, stored=number.unit)
-        return SweepAxis(name, label, values, [])
-    return SweepAxis(name, label, np.asarray(coordinate.values, dtype=np.float64), [])
+    return SweepAxis(name, label, values, [])
 
 
 Orientation = Literal["wide", "tall"]

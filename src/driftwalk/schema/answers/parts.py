@@ -193,9 +193,8 @@ def estimates(found: xr.Dataset) -> list[Estimate]:
         With ``estimate`` and ``unit`` by ``parameter``; ``interval`` may be absent. Of a part
         without them nothing is returned.
     """
-    if any(name not in found.variables for name in ("estimate", "parameter", "unit")):
-        return []
-    if found["estimate"].ndim != 1:
+    absent = any(name not in found.variables for name in ("estimate", "parameter", "unit"))
+    if absent or found["estimate"].ndim != 1:
         return []
     stored = found.attrs.get("confidence", found.get("confidence"))
     confidence = None if stored is None else float(stored)
