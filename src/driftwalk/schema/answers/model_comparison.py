@@ -20,22 +20,18 @@ ASPECT_WORDS: Final = {
     "wall": "place near the wall",
     "memory": "memory of the speed",
 }
-CHECK_WORDS: Final = {
-    "displacement_1": "mean squared displacement over 1 step interval",
-    "displacement_3": "mean squared displacement over 3",
-    "displacement_10": "mean squared displacement over 10",
-    "displacement_30": "mean squared displacement over 30",
-    "displacement_100": "mean squared displacement over 100",
-    "speed_time": "time over which the speed lasts",
-    "wall_share": "share of the time at the wall",
-    "rest_share": "share of the time at rest",
+_CHECKS: Final = {
+    "displacement_1": ("mean squared displacement over 1 step interval", "msd, 1 step"),
+    "displacement_3": ("mean squared displacement over 3", "msd, 3 steps"),
+    "displacement_10": ("mean squared displacement over 10", "msd, 10 steps"),
+    "displacement_30": ("mean squared displacement over 30", "msd, 30 steps"),
+    "displacement_100": ("mean squared displacement over 100", "msd, 100 steps"),
+    "speed_time": ("time over which the speed lasts", "speed lasts"),
+    "wall_share": ("share of the time at the wall", "at the wall"),
+    "rest_share": ("share of the time at rest", "at rest"),
 }
-CHECK_LABELS: Final = {
-    "displacement_1": "msd, 1 step", "displacement_3": "msd, 3 steps",
-    "displacement_10": "msd, 10 steps", "displacement_30": "msd, 30 steps",
-    "displacement_100": "msd, 100 steps", "speed_time": "speed lasts",
-    "wall_share": "at the wall", "rest_share": "at rest",
-}  # fmt: skip
+CHECK_WORDS: Final = {name: words for name, (words, _) in _CHECKS.items()}
+CHECK_LABELS: Final = {name: label for name, (_, label) in _CHECKS.items()}
 """Short ones, for figures."""
 
 _COLUMNS: Final = ("model", "numbers", "distance", "behind", "D of steps")

@@ -27,7 +27,9 @@ _FILES: Final = (
     control,
 )  # fmt: skip
 
-KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}
+KINDS: Final[dict[str, Kind]] = {
+    kind.name: kind for file in _FILES for kind in vars(file).values() if isinstance(kind, Kind)
+}
 """By the attribute ``kind``."""
 
 

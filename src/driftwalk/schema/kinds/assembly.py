@@ -237,10 +237,3 @@ attributes (the tank is known):
 """,
     *RATES,
 )
-
-KINDS: Final = (
-    ASSEMBLY,
-    ASSEMBLY_PATH,
-    ATTRACTION,
-    CLASSIFICATION,
-)

@@ -313,5 +313,3 @@ attributes (200 pairs of steps or more):
     halves_ks_distance number: KS distance of the first half's steps to the second's
     halves_p_value number: share of random halves that differ as much
 """)
-
-KINDS: Final = (CALIBRATION, MODEL_CALIBRATION, MODEL_COMPARISON)

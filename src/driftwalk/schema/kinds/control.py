@@ -95,5 +95,3 @@ attributes:
 """,
     *SOURCE_WARNINGS,
 )
-
-KINDS: Final = (CONTROL_POLICY, CONTROL_TEST)

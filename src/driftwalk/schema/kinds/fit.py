@@ -307,5 +307,3 @@ WALL_NUMBERS: Final = (
 )
 PARAMETERS: Final = {one.name: one for one in (*BLOCK_NUMBERS, *LAW_NUMBERS)}
 """In the order in which a fit holds them."""
-
-KINDS: Final = (FIT,)

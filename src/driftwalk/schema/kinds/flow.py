@@ -90,8 +90,6 @@ attributes (the flow changes, and its repeat is stated):
     flags={"flag": ORIGIN},
 )
 
-KINDS: Final = (FLOW_FIELD,)
-
 _CHANGES: Final = "the flow changes in time"
 
 FLOW_SERIES: Final = attributes(f"""

@@ -111,5 +111,3 @@ attributes (the comparison was left out):
     *_density("step_length", "m", "step lengths"),
     *_density("turning_angle", "rad", "turning angles"),
 )
-
-KINDS: Final = (MODEL_CHECK,)

@@ -172,5 +172,3 @@ attributes:
     step_interval_s number: time of a step
     ties text: how points that share a coordinate are counted
 """)
-
-KINDS: Final = (TRAJECTORY, SIMULATION, STEPS, COMPARISON, REPLICATE_COMPARISON)

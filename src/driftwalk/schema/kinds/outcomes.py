@@ -292,12 +292,3 @@ attributes (the tank is not well mixed, for another number of blocks):
     other_blocks_refused text: why no rate is extrapolated
 """,
 )
-
-KINDS: Final = (
-    OUTCOME_DISTRIBUTION,
-    CLASS_TIMES,
-    ASSEMBLY_SIZES,
-    STEADY_STATE,
-    KINETICS,
-    OUTCOME_POSTERIOR,
-)

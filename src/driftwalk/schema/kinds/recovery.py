@@ -150,5 +150,3 @@ attributes:
 """,
     flags={"status": _statuses("calibrated", "not_calibrated")},
 )
-
-KINDS: Final = (RECOVERY, MODEL_RECOVERY)

@@ -247,5 +247,3 @@ attributes (their number does not vary):
     *(replace(one, dims="setting", when="it varies") for one in AXES),
     *SOURCE_WARNINGS,
 )
-
-KINDS: Final = (SENSITIVITY, COMPONENTS, SOBOL_DESIGN, SOBOL_INDICES, YIELD)
