@@ -133,20 +133,14 @@ def model_estimates(fit: xr.Dataset) -> list[Estimate]:
 
     Where flows were named each has its own σ_F.
     """
-    linear = fit.attrs.get("drag_law") == "linear"
-    found = [
-        one
-        for one in estimates(fit)
-        if one.number not in LAW_NUMBERS and not (linear and one.number.name == "drag_coefficient")
-    ]
-    if "flow_force_std" not in fit:
-        return found
-    return [
-        part
-        for one in found
-        if one.number.name != "force_noise_intensity"
-        for part in (_of_flows(fit, one) if one.number.name == "force_std" else [one])
-    ]
+    of_flows = "flow_force_std" in fit
+    left_out = ["drag_coefficient"] if fit.attrs.get("drag_law") == "linear" else []
+    left_out += ["force_noise_intensity"] if of_flows else []
+    made: list[Estimate] = []
+    for one in estimates(fit):
+        if one.number not in LAW_NUMBERS and one.number.name not in left_out:
+            made += _of_flows(fit, one) if of_flows and one.number.name == "force_std" else [one]
+    return made
 
 
 def _of_flows(fit: xr.Dataset, first: Estimate) -> list[Estimate]:

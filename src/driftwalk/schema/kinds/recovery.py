@@ -15,7 +15,6 @@ RECOVERED: Final = {
 """The numbers of a fit that a recovery study compares with their truth."""
 ESTIMATED, NOT_ESTIMATED, NOT_SIMULATED = range(3)
 """Status of a recording, of both kinds; without an estimate it has a message."""
-_MISSING: Final = "missing_share number: share of the samples that is missing"
 
 
 def _statuses(estimated: str, not_estimated: str) -> dict[str, int]:
@@ -82,7 +81,7 @@ attributes:
     flow text: the true flow
     sample_interval_s number: time between samples
     recordings_per_fit number: recordings that are fitted together
-    {_MISSING}
+    missing_share number: share of the samples that is missing
     seed
     confidence number: of the fits' intervals
     coverage_confidence number: of the coverage's interval
@@ -141,7 +140,7 @@ attributes:
     fixed object: known values of the model's other numbers, SI units
     duration_s number: length of each recording
     sample_rate_Hz number: samples of each recording per second
-    {_MISSING}
+    missing_share number: share of the samples that is missing
     seed
     position_noise_m number: true noise of the recorded positions
     noise text: whether the calibrations estimated it: estimated, or known
