@@ -358,7 +358,7 @@ class Bars:
     length: float
 
     def depth(self, frame: int, body: int, points: Floats) -> Floats:
-        """Return how deep points of the marker's own frame lie in the bar [m]; below 0 beside it.
+        """Return how deep points of the marker's own frame lie in the bar [m]; outside below 0.
 
         Points have the shape (..., 2).
         """

@@ -252,7 +252,7 @@ def kind(
         A head may say in brackets when its rows are there. A variable with its name alone is a
         coordinate that is called as it is named, which a row of its dimension may say too
         (``name [units] int: words``); an attribute with its name alone is one of `COMMON`. A row
-        with choices in angle brackets, ``<low|high>``, stands for as many rows: one with all the
+        with choices in angle brackets, ``<low|high>``, is read as so many rows: one with all the
         first words, one with all the second ones, and so on.
     *more : Variable or Attribute
         Further ones.
@@ -309,7 +309,7 @@ def _rows_of(text: str) -> dict[str, list[tuple[str, str]]]:
 
 
 def _chosen(row: str) -> list[str]:
-    """Return the rows that one with choices stands for, else itself alone."""
+    """Return the rows that one with choices is read as, else itself alone."""
     parts = [part.split("|") for part in re.split("[<>]", row)]
     count = max(map(len, parts))
     return ["".join(words[n % len(words)] for words in parts) for n in range(count)]
