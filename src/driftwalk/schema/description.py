@@ -277,9 +277,7 @@ def kind(
     )
 
 
-def variables(
-    text: str, flags: Mapping[str, Mapping[str, int]] = MappingProxyType({})
-) -> tuple[Variable, ...]:
+def variables(text: str) -> tuple[Variable, ...]:
     """Return the variables of a part of a kind's text; without a head they are always there.
 
     Examples
@@ -288,7 +286,7 @@ def variables(
     >>> one.dims, one.units, one.long_name, one.note
     ('time', 'm', 'place of the body', 'NaN is a gap')
     """
-    return tuple(_variable(*row, flags) for row in _rows_of(f"variables:\n{text}")["variables"])
+    return tuple(_variable(*row, {}) for row in _rows_of(f"variables:\n{text}")["variables"])
 
 
 def attributes(text: str) -> tuple[Attribute, ...]:

@@ -61,7 +61,8 @@ def test_a_row_with_choices_stands_for_one_row_of_each() -> None:
 
 
 def test_bits_may_be_set_together() -> None:
-    [one] = variables("status(run) bits: problems; 0 is sound", {"status": {"escaped": 2}})
+    text = "kind: a\nversion: 1\nvariables:\nstatus(run) bits: problems; 0 is sound"
+    [one] = kind(text, flags={"status": {"escaped": 2}}).variables
     assert (one.bits, one.holds, one.note) == (True, "int", "0 is sound")
 
 
