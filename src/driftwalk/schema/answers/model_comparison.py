@@ -98,7 +98,7 @@ def ranking_table(found: xr.Dataset) -> Table:
             f"{float(one['behind']):.2f} ± {float(one['behind_std']):.2f}" if index else "",
             f"{float(one['held_out_distance'][0]):.3f}",
             *((_misfit(one),) if asked else ()),
-            _verdict(one),
+            "a walk of steps" if bool(one["baseline"]) else str(one["verdict"].values),
         )
         for index, one in enumerate(each(found, "model"))
     ]
@@ -110,10 +110,6 @@ def _misfit(one: xr.Dataset) -> str:
     if not bool(one["asked"]):
         return ""
     return f"{float(one['discrepancy']):.0f} (own below {float(one['discrepancy_q95']):.0f})"
-
-
-def _verdict(one: xr.Dataset) -> str:
-    return "a walk of steps" if bool(one["baseline"]) else str(one["verdict"].values)
 
 
 def _model(one: xr.Dataset) -> dict[str, Any]:
