@@ -42,6 +42,7 @@ SURVIVAL: Final = {
 """Words, colour and dashes of each time until an event."""
 
 COMPACT: Final = "compactness"
+DASHES: Final = ("-", (0, (5, 2)), (0, (1, 1.5)))
 GROWTH: Final = {
     "mean size": {"mean_size": "mean size"},
     "shares": {
@@ -395,9 +396,7 @@ def plot_growth(
     ax = style.axes_or_new(ax, height_mm=65.0)
     time = sizes["time"].values
     for one, color, label in zip(both, (style.BLUE, style.ORANGE), labels, strict=False):
-        for (name, words), dashes in zip(
-            curves.items(), ("-", (0, (5, 2)), (0, (1, 1.5))), strict=False
-        ):
+        for (name, words), dashes in zip(curves.items(), DASHES, strict=False):
             # Dashes are named once, and then the colour of the second one.
             named = words if len(curves) > 1 and one is sizes else ""
             text = named or (label if name == next(iter(curves)) else "")
