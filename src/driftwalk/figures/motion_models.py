@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, Final
 
@@ -63,8 +64,7 @@ def pairs_figure(calibration: xr.Dataset) -> Figure:
     """Return the draws of each pair of parameters, with each parameter's on the diagonal."""
     from matplotlib.ticker import MaxNLocator
 
-    names = [str(name) for name in calibration["parameter"].values]
-    count = len(names)
+    count = calibration.sizes["parameter"]
     # 24 mm for a panel, 14 mm for the title.
     width, height = (max(least, 24.0 * count) for least in (style.DOUBLE_COLUMN_MM, 90.0))
     figure, axes = style.new_panels(
@@ -85,7 +85,6 @@ def pairs_figure(calibration: xr.Dataset) -> Figure:
         elif column:
             ax.tick_params(labelleft=False)
         ax.xaxis.set_major_locator(MaxNLocator(2))
-    axes[0].set_yticks([])
     counts = calibration.attrs["estimate_from"] == "summaries"
     figure.suptitle(
         f"{model_words(calibration.attrs['model'])}: values that could have given the recording "
@@ -99,16 +98,16 @@ def profiles_figure(calibration: xr.Dataset) -> Figure:
     """Return how the discrepancy rises along each parameter, the others at their best."""
     from scipy.stats import chi2
 
-    names = [str(name) for name in calibration["parameter"].values]
-    across = min(4, len(names))
-    rows = -(-len(names) // across)
+    count = calibration.sizes["parameter"]
+    across = min(4, count)
+    rows = -(-count // across)
     # 42 mm for a profile, 14 mm for the title.
     figure, axes = style.new_panels(rows, across, height_mm=42.0 * rows + 14.0, sharey=True)
     confidence = float(calibration.attrs["confidence"])
     level = float(chi2.ppf(confidence, 1))
-    for index, ax in enumerate(axes[: len(names)]):
+    for index, ax in enumerate(axes[:count]):
         _plot_profile(calibration, index, level, ax)
-    for ax in axes[len(names) :]:
+    for ax in axes[count:]:
         ax.set_visible(False)
     for ax in axes[::across]:
         ax.set_ylabel("rise of the discrepancy")
@@ -141,7 +140,6 @@ def _plot_one(calibration: xr.Dataset, index: int, ax: Axes) -> None:
     ax.hist(one["posterior_sample"].values, bins=24, histtype="stepfilled", **look)
     _plot_answer(one, ax)
     ax.set_yticks([])
-    ax.xaxis.set_major_locator(_few_ticks())
 
 
 def _plot_profile(calibration: xr.Dataset, index: int, level: float, ax: Axes) -> None:
@@ -279,27 +277,21 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
     shown = comparison.isel(model=slice(None, None, -1))
     place = np.arange(shown.sizes["model"])
     # The colours of LOOKS belong to single models.
-    for baseline, color, marker in ((False, style.INK, "o"), (True, style.MUTED, "D")):
-        of = shown["baseline"].values.astype(bool) == baseline
+    walks = shown["baseline"].values.astype(bool)
+    draw = partial(ax.errorbar, ms=3.5, lw=0.9, capsize=2.0)
+    for of, color, marker, label in (
+        (~walks, style.INK, "o", "motion model"),
+        (walks, style.MUTED, "D", "walk of recorded steps"),
+    ):
         if of.any():
-            ax.errorbar(
-                shown["score"].values[of],
-                place[of],
-                xerr=shown["score_std"].values[of],
-                fmt=marker,
-                ms=3.5,
-                lw=0.9,
-                capsize=2.0,
-                color=color,
-                label="walk of recorded steps" if baseline else "motion model",
-            )
+            score, error = (shown[name].values[of] for name in ("score", "score_std"))
+            draw(score, place[of], xerr=error, fmt=marker, color=color, label=label)
     own = own_score(comparison)
     ax.axvline(own, color=style.INK, lw=0.6, ls="--", label="the recording's own parts")
+    columns = (shown[of].values for of in ("model", "baseline", "verdict"))
     names = [
         name if walk else f"{model_words(name)} ({verdict})"
-        for name, walk, verdict in zip(
-            *(shown[of].values for of in ("model", "baseline", "verdict")), strict=True
-        )
+        for name, walk, verdict in zip(*columns, strict=True)
     ]
     ax.set_yticks(place, names)
     ax.set(xlim=(0.0, None), ylim=(-0.6, place.size - 0.4))

@@ -160,18 +160,11 @@ def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
             minutes[known], 100.0 * np.nanmedian(stated[known], axis=1), "x", ms=4.0, color=color,
             label=f"{of}stated by the fit",
         )  # fmt: skip
-        low, middle, high = (
-            float(part[f"drag_coefficient_error_scale{end}"]) for end in ("_low", "", "_high")
-        )
-        root = np.sqrt(60.0 * drawn)
-        band = percent(recovery.attrs["needed_confidence"])
-        ax.plot(
-            drawn, 100.0 * middle / root, color=color, lw=0.9,
-            label=f"{of}law $T^{{-1/2}}$ (band: {band})",
-        )  # fmt: skip
-        ax.fill_between(
-            drawn, 100.0 * low / root, 100.0 * high / root, color=color, alpha=0.15, lw=0.0
-        )
+        scales = (part[f"drag_coefficient_error_scale{end}"] for end in ("_low", "", "_high"))
+        low, middle, high = (100.0 * float(scale) / np.sqrt(60.0 * drawn) for scale in scales)
+        law = f"{of}law $T^{{-1/2}}$ (band: {percent(recovery.attrs['needed_confidence'])})"
+        ax.plot(drawn, middle, color=color, lw=0.9, label=law)
+        ax.fill_between(drawn, low, high, color=color, alpha=0.15, lw=0.0)
     asked = float(recovery.attrs["drag_coefficient_precision"])
     if np.isfinite(asked):
         ax.axhline(100.0 * asked, color=style.MUTED, lw=0.7, dashes=(3, 3), label="wanted")

@@ -69,16 +69,10 @@ def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.axhline(0.0, color=style.MUTED, lw=0.6)
     names = [str(name) for name in check["component"].values]
     aside = np.linspace(-0.15, 0.15, len(names)) if len(names) > 1 else np.zeros(1)
-    for k, name in enumerate(names):
+    rows = zip(names, aside, check["autocorrelation"].values, COLORS, MARKERS, strict=False)
+    for name, shift, values, color, marker in rows:
         shown = "θ" if name == "theta" else name
-        ax.plot(
-            lag + aside[k],
-            check["autocorrelation"].values[k],
-            MARKERS[k],
-            color=COLORS[k],
-            ms=3.0,
-            label=f"error in {shown}",
-        )
+        ax.plot(lag + shift, values, marker, color=color, ms=3.0, label=f"error in {shown}")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set(xlim=edges[[0, -1]], xlabel="lag (samples)", ylabel="autocorrelation")
     # Room below the lowest step.

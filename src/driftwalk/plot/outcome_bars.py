@@ -113,9 +113,9 @@ def plot_outcomes(
     return ax
 
 
-def _on_classes(proportion: xr.DataArray, names: list[str]) -> Floats:
-    """Return shares in the order of `names`, zero for a class that the dataset lacks."""
-    aligned = proportion.reindex({"class": np.array(names, dtype=object)}, fill_value=0.0)
+def _on_classes(values: xr.DataArray, names: list[str], absent: float = 0.0) -> Floats:
+    """Return shares or limits in the order of `names`, with a value for those that are absent."""
+    aligned = values.reindex({"class": np.array(names, dtype=object)}, fill_value=absent)
     return np.asarray(aligned.values, dtype=np.float64)
 
 
@@ -123,10 +123,7 @@ def _bars(dataset: xr.Dataset, names: list[str], shown: list[int]) -> Floats:
     """Return proportion, low and high of the classes that are drawn, shape (3, shown)."""
     proportion = _on_classes(dataset["proportion"], names)
     # A class that the dataset does not list has a share of 0, and no interval.
-    listed = np.isin(names, class_names(dataset))
-    ends = (
-        np.where(listed, _on_classes(dataset[f"interval_{end}"], names), np.nan) for end in _ENDS
-    )
+    ends = (_on_classes(dataset[f"interval_{end}"], names, np.nan) for end in _ENDS)
     # The rest has no interval of its own.
     none = [np.nan] * (len(shown) < len(names))
     return np.array([with_rest(proportion, shown), *(np.append(end[shown], none) for end in ends)])

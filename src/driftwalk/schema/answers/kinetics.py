@@ -71,15 +71,11 @@ def equal_words(found: xr.Dataset) -> str:
 
 def score_table(found: xr.Dataset) -> Table:
     """Return the held-out scores of the candidates."""
-    rows = [
-        [
-            str(one["model"].values),
-            f"{float(one['score']):.4f}",
-            f"{float(one['score_behind']):+.4f}",
-            f"{float(one['score_behind_standard_error']):.4f}",
-        ]
-        for one in each(found, "model")
-    ]
+    forms = {"score": ".4f", "score_behind": "+.4f", "score_behind_standard_error": ".4f"}
+    rows = []
+    for one in each(found, "model"):
+        numbers = [f"{float(one[name]):{form}}" for name, form in forms.items()]
+        rows.append([str(one["model"].values), *numbers])
     return Table(rows, ["model", "held-out ln L per run", "behind the best", "standard error"])
 
 
