@@ -20,12 +20,7 @@ from driftwalk.schema.description import Kind, Number, Variable
 from driftwalk.schema.kinds import find_kind
 from driftwalk.schema.kinds.calibration import CALIBRATION, OPTIMUM, calibration_of
 from driftwalk.schema.kinds.fit import FIT, PARAMETERS
-from driftwalk.schema.parameters import (
-    BLOCK,
-    Parameter,
-    StoredParameter,
-    flat_name,
-)
+from driftwalk.schema.parameters import BLOCK, Parameter, StoredParameter, flat_name
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from driftwalk.schema.description import (
-    SOURCE_WARNINGS,
-    Attribute,
-    Variable,
-    kind,
-    limited,
-    variables,
-)
+from driftwalk.schema.description import SOURCE_WARNINGS, Attribute, kind, limited
 from driftwalk.schema.kinds.assembly import CLASS, RATES, SETTINGS
 
 _OF_RUNS: Final = "made from runs"
@@ -91,15 +84,15 @@ attributes:
 )
 
 
-def _mean(name: str, dim: str, words: str, note: str = "") -> tuple[Variable, ...]:
-    return variables(f"""
+def _mean(name: str, dim: str, words: str, note: str = "") -> str:
+    return f"""
     {name}({dim}) [1]: {words}, mean over runs{note}
     {name}_<low|high>({dim}) [1]: <lower|upper> limit, {words}; NaN of a single run
-""")
+"""
 
 
 ASSEMBLY_SIZES: Final = kind(
-    """
+    f"""
 kind: assembly_sizes
 version: 1
 dimensions:
@@ -109,6 +102,12 @@ variables:
     size(size) int: smallest size of the group, in blocks
     size_to(size) int: largest size of the group, in blocks
     time(time) [s]: time from the start of the run
+    {_mean("number", "size", "assemblies of this size per run", "; at the end")}
+    {_mean("block_share", "size", "share of the blocks in assemblies of this size", "; at the end")}
+    {_mean("mean_size", "time", "blocks over assemblies")}
+    {_mean("largest_share", "time", "share of the blocks in the largest assembly")}
+    {_mean("free_share", "time", "share of the blocks that are alone")}
+    {_mean("compactness", "time", "compactness, as at the end", "; NaN where no run has one")}
 attributes:
     runs number: runs with an outcome
     left_out number: runs without an outcome
@@ -119,12 +118,6 @@ attributes:
     compactness_<low|high> number: <lower|upper> end of its interval
     compactness_runs number: runs with an assembly of four blocks or more
 """,
-    *_mean("number", "size", "assemblies of this size per run", "; at the end"),
-    *_mean("block_share", "size", "share of the blocks in assemblies of this size", "; at the end"),
-    *_mean("mean_size", "time", "blocks over assemblies"),
-    *_mean("largest_share", "time", "share of the blocks in the largest assembly"),
-    *_mean("free_share", "time", "share of the blocks that are alone"),
-    *_mean("compactness", "time", "compactness, as at the end", "; NaN where no run has one"),
     *_SETTINGS_OF_RUNS,
 )
 

@@ -6,14 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from driftwalk.schema.description import (
-    SOURCE_WARNINGS,
-    Number,
-    attributes,
-    kind,
-    limited,
-    variables,
-)
+from driftwalk.schema.description import SOURCE_WARNINGS, Number, kind, limited, variables
 from driftwalk.schema.kinds.assembly import SETTINGS
 from driftwalk.schema.kinds.fit import BLOCK_NUMBERS
 
@@ -73,20 +66,6 @@ def ranked_axes(names: Sequence[str]) -> list[str]:
 
 
 _DIMENSIONS: Final = "\n".join(f"{one.name}: settings, where it varies" for one in AXES)
-_REFERENCE: Final = attributes("""
-    reference_runs number: runs of the reference
-attributes (the reference says so):
-    reference_blocks number: blocks of the reference
-    reference_latching text: latching of the reference
-    reference_hidden_face_drag text: hidden faces of the reference
-attributes (the reference has typed faces):
-    reference_faces text: kinds of blocks, and which types of their faces latch
-attributes (the reference says so):
-    reference_<drag_coefficient|force_std_N|tank_diameter_m> number: where the reference lies
-    reference_realisations number: realisations of the reference
-    reference_mean_pairwise_l1 number: mean l1 distance of two of them
-    reference_expected_pairwise_l1 number: what chance alone gives
-""")
 
 SENSITIVITY: Final = kind(
     f"""
@@ -120,9 +99,19 @@ attributes:
     noise_floor_mean number: distance that the reference itself would have
     noise_floor_95 number: its 95 % quantile
     study
+    reference_runs number: runs of the reference
+attributes (the reference says so):
+    reference_blocks number: blocks of the reference
+    reference_latching text: latching of the reference
+    reference_hidden_face_drag text: hidden faces of the reference
+    reference_<drag_coefficient|force_std_N|tank_diameter_m> number: where the reference lies
+    reference_realisations number: realisations of the reference
+    reference_mean_pairwise_l1 number: mean l1 distance of two of them
+    reference_expected_pairwise_l1 number: what chance alone gives
+attributes (the reference has typed faces):
+    reference_faces text: kinds of blocks, and which types of their faces latch
 """,
     *AXES,
-    *_REFERENCE,
     *limited(SETTINGS, "it does not vary", without="trial study"),
     *SOURCE_WARNINGS,
 )
@@ -152,19 +141,15 @@ attributes:
     *(replace(one, when="decomposed from a map that says so") for one in SENSITIVITY.attributes),
 )
 
-_DESIGN: Final = """
-    value(setting input): value of the input
-    <low|high>(input): <lowest|highest> value
-"""
-
-SOBOL_DESIGN: Final = kind(f"""
+SOBOL_DESIGN: Final = kind("""
 kind: sobol_design
 version: 1
 dimensions:
     setting: settings, in an order that matters
     input text: inputs, by name
 variables:
-    {_DESIGN}
+    value(setting input): value of the input
+    <low|high>(input): <lowest|highest> value
 attributes:
     samples number: samples of the design, a power of two
     seed number: seed of the scrambling
@@ -172,7 +157,7 @@ attributes:
 
 
 SOBOL_INDICES: Final = kind(
-    f"""
+    """
 kind: sobol_indices
 version: 1
 dimensions:
@@ -188,7 +173,8 @@ variables:
         sampling noise
 variables (made by sensitivity_indices):
     proportion(setting output) [1]: share of runs
-    {_DESIGN}
+    value(setting input): value of the input
+    <low|high>(input): <lowest|highest> value
 attributes:
     samples number: samples of the design
     confidence number: of the half widths
