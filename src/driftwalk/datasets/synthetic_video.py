@@ -19,7 +19,6 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.core.random_streams import VideoStream
 from driftwalk.datasets.synthetic_video_settings import (
-    Bars,
     Colour,
     Glare,
     VideoSettings,
@@ -204,7 +203,7 @@ class _Painter:
             raise InputError("a block is drawn with its orientation, and the trajectory lacks some")
         self.poses: Floats = np.stack([*columns, theta], axis=-1).astype(np.float64)
         self.rates = _rates(self.time, self.poses)
-        self.bars: Bars = place_bars(settings, self.time, self.poses.shape[1])
+        self.bars = place_bars(settings, self.time, self.poses.shape[1])
         self.glare = Glare(settings)
         self.points = marker_points(settings)
         self.world = self._world_map(_FINE)

@@ -185,8 +185,7 @@ def density_mesh(
 
 def density_of(share: Floats, length_mm: Floats, angle_deg: Floats) -> Floats:
     """Return shares per bin [1] as a density [% mm⁻¹ °⁻¹], whatever the sizes of the bins."""
-    density: Floats = 100.0 * share / np.outer(np.diff(length_mm), np.diff(angle_deg))
-    return density
+    return 100.0 * share / np.outer(np.diff(length_mm), np.diff(angle_deg))
 
 
 def filled_range(marginal: Floats, edge: Floats) -> tuple[float, float]:
@@ -226,8 +225,7 @@ def _edges(values: Floats, bins: int) -> Floats:
     tail = (1.0 - SHOWN_FRACTION) / 2.0
     low, high = np.quantile(values, [tail, 1.0 - tail])
     margin = 0.03 * (high - low) or 0.5 * abs(high) or 1.0
-    edges: Floats = np.linspace(low - margin, high + margin, bins + 1)
-    return edges
+    return np.linspace(low - margin, high + margin, bins + 1)
 
 
 def _checked(

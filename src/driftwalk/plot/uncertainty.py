@@ -212,5 +212,4 @@ def through_optimum(calibration: xr.Dataset, along: PlotParameter) -> xr.Dataset
     """Return the line of the coarse map next to the optimum in the other parameters."""
     others = [one for one in plot_parameters(calibration) if one.name != along.name]
     best = {one.name: one.best(calibration) / one.factor for one in others}
-    line: xr.Dataset = calibration[[*DISTANCES]].sel(best, method="nearest")
-    return line
+    return calibration[[*DISTANCES]].sel(best, method="nearest")

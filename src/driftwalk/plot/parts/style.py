@@ -194,8 +194,7 @@ def figure_of(ax: Axes) -> Figure:
 
 def axes_points(ax: Axes) -> Floats:
     """Return width and height of axes as they lie now [pt]."""
-    size: Floats = np.array([ax.bbox.width, ax.bbox.height]) / figure_of(ax).dpi * 72.0
-    return size
+    return np.array([ax.bbox.width, ax.bbox.height]) / figure_of(ax).dpi * 72.0
 
 
 def settle_layout(ax: Axes) -> None:

@@ -436,8 +436,7 @@ def answer_of(found: xr.Dataset, **more: Any) -> Answer | None:
     kind = kind_of(found)
     if kind is None or kind.answer is None:
         return None
-    answer: Answer = load_maker(kind.answer)(found, **more)
-    return with_source_warnings(answer, found)
+    return with_source_warnings(load_maker(kind.answer)(found, **more), found)
 
 
 def with_source_warnings(answer: Answer, found: xr.Dataset) -> Answer:
