@@ -333,9 +333,8 @@ class _Painter:
         high = np.ceil(pixels.max(axis=0)).astype(int) + 1
         columns = slice(max(int(low[0]), 0), min(int(high[0]), settings.width_px))
         rows = slice(max(int(low[1]), 0), min(int(high[1]), settings.height_px))
-        if columns.start >= columns.stop or rows.start >= rows.stop:
-            return None
-        return rows, columns
+        inside = columns.start < columns.stop and rows.start < rows.stop
+        return (rows, columns) if inside else None
 
     def _to_marker(self, pose: Floats, world: npt.NDArray[Any]) -> Floats:
         """Return world points in the frame of a marker: u from disc 1 to disc 2."""

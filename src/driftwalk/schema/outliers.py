@@ -144,9 +144,7 @@ def without_outliers(track: Track) -> Track:
     999
     """
     wrong = outliers_in(track)
-    if not wrong.any():
-        return track
-    return Track(*(column[~wrong] for column in track))
+    return Track(*(column[~wrong] for column in track)) if wrong.any() else track
 
 
 def without_far_outliers(track: Track) -> Track:
