@@ -43,6 +43,7 @@ SURVIVAL: Final = {
 
 COMPACT: Final = "compactness"
 DASHES: Final = ("-", (0, (5, 2)), (0, (1, 1.5)))
+"""Of the curves of one figure, in their order: apart without colours; chosen by eye."""
 GROWTH: Final = {
     "mean size": {"mean_size": "mean size"},
     "shares": {
