@@ -13,7 +13,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, PARTING, BondGraph, face_table
-from driftwalk.assembly.outcomes.outcome_classes import disc_class
+from driftwalk.assembly.outcomes.outcome_classes import state_class
 from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import make_plan, start_poses, steps_of
@@ -48,16 +48,12 @@ class _Moment:
     def __init__(self, world: _core.LiveWorld, study: Study) -> None:
         self.state: dict[str, npt.NDArray[Any]] = world.state()
         self.time = float(times_of(np.array(world.step), time_step=study.time_step_s))
-        self._chirality = study.assembly.chirality
         self.table = face_table(study.assembly)
-        self._block = study.block
+        self._study = study
 
     @cached_property
     def outcome(self) -> str:
-        if not self._block.has_lattice:
-            pose, labels = self.state["pose"], self.state["assembly"]
-            return disc_class(pose, labels, **self._block.contact_size)
-        return LatticeWorld.of(self.state).outcome(self._chirality)
+        return state_class(self.state, self._study)
 
 
 class _NextSettings(NamedTuple):
@@ -384,14 +380,13 @@ class LiveTank:
 
     def _go(self, steps: int) -> None:
         """Take time steps, and what is wished at the beginning of force intervals."""
-        while steps > 0:
+        end = self._world.step + steps
+        while (left := end - self._world.step) > 0:
             into = self._world.step % self._steps_per_interval
             if into == 0:
                 self._fulfil()
             waits = self._next_settings is not self._active or self.waiting > 0
-            now = min(steps, self._steps_per_interval - into) if waits else steps
-            self._step(now)
-            steps -= now
+            self._step(min(left, self._steps_per_interval - into) if waits else left)
 
     def _fulfil(self) -> None:
         """Give the world what is wished, at the beginning of a force interval."""
@@ -437,12 +432,6 @@ class LiveTank:
         self._world.set_pull(None if pull is None else pull.native)
 
     def _step(self, steps: int) -> None:
-        """Take time steps and note what has joined and parted in them."""
-        end = self._world.step + steps
-        while self._world.step < end:
-            self._step_some(end - self._world.step)
-
-    def _step_some(self, steps: int) -> None:
         """Take time steps, fewer where there are too many events, and note these."""
         study = self._active.study
         state = self._world.state()
@@ -465,8 +454,6 @@ class LiveTank:
                 lattice.partition.cut(np.flatnonzero(side).tolist())
             else:
                 continue
-            if self.has_lattice:
-                outcome = lattice.outcome(study.assembly.chirality)
-            else:
-                outcome = disc_class(pose, lattice.partition.labels, **study.block.contact_size)
+            now = np.array(lattice.cell), np.array(lattice.partition.labels)
+            outcome = state_class({"pose": pose, "cell": now[0], "assembly": now[1]}, study)
             self._events.append(LiveEvent(time, blocks, outcome, is_parting=kind == PARTING))

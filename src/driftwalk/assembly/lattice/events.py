@@ -22,6 +22,7 @@ from driftwalk.assembly.lattice.joined_faces import (
 )
 from driftwalk.assembly.lattice.many_blocks import (
     DiscWorld,
+    Names,
     ReplayedEvents,
     SquareWorld,
     replay_many,
@@ -30,10 +31,8 @@ from driftwalk.assembly.lattice.polyomino import Chirality, name_of, require_chi
 from driftwalk.assembly.outcomes.outcome_classes import (
     class_name,
     contact_pairs,
-    disc_shape,
     listed_classes,
     listed_shapes,
-    touching,
 )
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
@@ -108,7 +107,7 @@ def replay_events(
     if blocks > MOST_NAMED:
         many = _replay_many(events, end, lambda _: SquareWorld(blocks, chirality))
         return many._replace(kind=kind)
-    replay = _Replay(end.assembly.shape, events, chirality=chirality)
+    replay = _Replay(end.assembly.shape, events, chirality)
     return replay.result(events, end)._replace(kind=kind)
 
 
@@ -132,7 +131,7 @@ def replay_contacts(
     pose : ndarray, shape (runs, blocks, 2 or more)
         Columns x and y at the end [m]; of rectangles the third is theta [rad].
     diameter, width
-        As in `driftwalk.assembly.outcomes.outcome_classes.touching`.
+        As in `driftwalk.assembly.outcomes.outcome_classes.contact_pairs`.
 
     Raises
     ------
@@ -150,16 +149,14 @@ def replay_contacts(
     events = _Events(_whole(event_count), block, np.zeros_like(block), _kinds(event_kind))
     end = _Lattice(np.zeros((*labels.shape, 2), np.int64), np.zeros_like(labels), labels)
     _check_arrays(events, end)
-    if end.assembly.shape[1] > MOST_NAMED:
-        noun = "discs" if width is None else "rectangles"
+    noun = "discs" if width is None else "rectangles"
 
-        def world_of(run: int) -> DiscWorld:
-            told = events.kind is not None
-            pairs = [] if told else contact_pairs(pose[run], diameter=diameter, width=width)
-            return DiscWorld(pose.shape[1], pairs, noun=noun)
+    def world_of(run: int) -> DiscWorld:
+        told = events.kind is not None
+        pairs = [] if told else contact_pairs(pose[run], diameter=diameter, width=width)
+        return DiscWorld(pose.shape[1], pairs, noun=noun)
 
-        return _replay_many(events, end, world_of)
-    return _DiscReplay(pose, events, diameter=diameter, width=width).result(events, end)
+    return _replay_many(events, end, world_of)
 
 
 def _replay_many(
@@ -199,27 +196,10 @@ class _Lattice(NamedTuple):
     assembly: Integers
 
 
-class _Names:
-    """Names by number, in the order in which they came."""
-
-    def __init__(self, *names: str) -> None:
-        self.known = {name: number for number, name in enumerate(names)}
-
-    def number(self, name: str) -> int:
-        return self.known.setdefault(name, len(self.known))
-
-    def index_into(self, listed: tuple[str, ...]) -> npt.NDArray[np.int32]:
-        """Return from number to place in a list; at its end -1, so that -1 stays what it is."""
-        place = {name: index for index, name in enumerate(listed)}
-        return np.array([*(place[name] for name in self.known), -1], dtype=np.int32)
-
-
 class _Replay:
-    """The state of all runs while their events are applied."""
+    """The state of the squares of all runs while their events are applied."""
 
-    def __init__(
-        self, shape: tuple[int, ...], events: _Events, *, chirality: Chirality | None
-    ) -> None:
+    def __init__(self, shape: tuple[int, ...], events: _Events, chirality: Chirality) -> None:
         runs, blocks = shape
         slots = events.block.shape[1]
         self.bonds = None if events.kind is None else BondGraph(runs, blocks)
@@ -230,7 +210,7 @@ class _Replay:
             np.zeros((runs, blocks), dtype=np.int64),
             np.tile(np.arange(blocks), (runs, 1)),
         )
-        self.shapes, self.classes = _Names("1"), _Names(all_single(blocks))
+        self.shapes, self.classes = Names("1"), Names(all_single(blocks))
         # The number of the shape at the lowest block of each assembly, -1 at the other blocks.
         self.shape_of = np.zeros((runs, blocks), dtype=np.int64)
         self.event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)
@@ -244,7 +224,6 @@ class _Replay:
             self._join(event, at, events)
             return
         kind = events.kind[at, event]
-        _refuse((kind < JOINING) | (kind > CLOSING), at, event, "is of no kind")
         for number, change in ((JOINING, self._join), (PARTING, self._part)):
             if (kind == number).any():
                 change(event, at[kind == number], events)
@@ -284,7 +263,6 @@ class _Replay:
         first = self.bonds.reached(at, block[:, 0])
         whole = np.take_along_axis(first, block[:, 1:], axis=1)[:, 0] | (own[:, 0] != own[:, 1])
         _refuse(whole, at, event, "parts two blocks that are not held by that bond alone")
-        self._separate(at, first)
         self.event_shape[at, event, 2] = self.shape_of[at, own[:, 0]]
         for side, member in enumerate((first, (labels == own[:, :1]) & ~first)):
             lowest = member.argmax(axis=1)
@@ -294,9 +272,6 @@ class _Replay:
             self.event_assembly[at, event, side] = lowest
             self.event_shape[at, event, side] = shape
         self.outcome[at] = self.event_class[at, event] = self._class_numbers(at)
-
-    def _separate(self, at: Integers, side: Bools) -> None:
-        """Note that what is marked has parted from the others of the run."""
 
     def result(self, events: _Events, end: _Lattice) -> ReplayedEvents:
         """Apply all events, and return what they did; refuse those that lead elsewhere."""
@@ -341,7 +316,7 @@ class _Replay:
         numbers = []
         for row in codes:
             cells = tuple(divmod(code, far) for code in row[row < far * far].tolist())
-            name = name_of(moved_to_origin(cells), self.chirality or "merged")
+            name = name_of(moved_to_origin(cells), self.chirality)
             numbers.append(self.shapes.number(name))
         return np.array(numbers, dtype=np.int64)[inverse.reshape(-1)]
 
@@ -355,43 +330,6 @@ class _Replay:
             for row in worlds
         ]
         return np.array(numbers, dtype=np.int32)[inverse.reshape(-1)]
-
-
-class _DiscReplay(_Replay):
-    """The same of discs and rectangles, which stay as they lie."""
-
-    def __init__(
-        self, pose: Floats, events: _Events, *, diameter: float, width: float | None
-    ) -> None:
-        super().__init__(pose.shape[:2], events, chirality=None)
-        self.noun = "discs" if width is None else "rectangles"
-        self.touch = np.array([touching(one, diameter=diameter, width=width) for one in pose])
-        if events.kind is not None:
-            self.touch[:] = False
-
-    def _join(self, event: int, at: Integers, events: _Events) -> None:
-        # Contacts that close with a joining are told after it.
-        now, own = event, at
-        while events.kind is not None and own.size:
-            first, second = events.block[own, now].T
-            self.touch[own, first, second] = self.touch[own, second, first] = True
-            now += 1
-            own = own[events.number[own] > now]
-            own = own[events.kind[own, now] == CLOSING] if own.size else own
-        super()._join(event, at, events)
-
-    def _separate(self, at: Integers, side: Bools) -> None:
-        self.touch[at] &= side[:, :, None] == side[:, None, :]
-
-    def _align(self, at: Integers, block: Integers, face: Integers) -> None:
-        pass
-
-    def _shape_numbers(self, at: Integers, event: int, member: Bools) -> Integers:  # noqa: ARG002
-        names = [
-            disc_shape(self.touch[run][np.ix_(own, own)], noun=self.noun)
-            for run, own in zip(at, member, strict=True)
-        ]
-        return np.array([self.shapes.number(name) for name in names], dtype=np.int64)
 
 
 def rotate(cell: Integers, turn: Integers) -> Integers:
@@ -426,7 +364,10 @@ def _check_arrays(events: _Events, end: _Lattice) -> None:
         run = int(np.argmax(wrong))
         raise InputError(f"run {run}: {events.number[run]} events among {blocks} blocks")
     real = np.arange(slots) < events.number[:, None]
-    for what, values, limit in (("block", events.block, blocks), ("face", events.face, 4)):
+    numbers = [("block", events.block, blocks), ("face", events.face, 4)]
+    if events.kind is not None:
+        numbers.append(("kind", events.kind[..., None], CLOSING + 1))
+    for what, values, limit in numbers:
         bad = real[..., None] & ((values < 0) | (values >= limit))
         if bad.any():
             run, event, side = map(int, np.argwhere(bad)[0])

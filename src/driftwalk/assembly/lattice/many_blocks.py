@@ -1,26 +1,31 @@
-"""Replay the events of worlds of many blocks, run after run.
+"""Replay the events of worlds of many blocks, and of discs and rectangles, run after run.
 
 An event changes two assemblies, and the one that moves is the smaller: all events of a run of n
-blocks together move fewer than n log2(n) of them. Large assemblies are called by two counts, and
-the class of a world by the number of its assemblies: hardly two of them would have the same shape.
+blocks together move fewer than n log2(n) of them. Among many blocks large assemblies are called by
+two counts, and the class of a world by the number of its assemblies: hardly two of them would have
+the same shape.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, OPENING, PARTING
+from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, OPENING
 from driftwalk.assembly.lattice.polyomino import Chirality, name_of, put_beside, shape_order
+from driftwalk.assembly.outcomes.outcome_classes import class_name, sort_classes
 from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import (
     MOST_CELLS_NAMED,
     MOST_DISCS,
+    MOST_NAMED,
     STEPS,
+    all_single,
     counted_class,
     counted_graph,
     counted_shape,
@@ -49,6 +54,22 @@ class ReplayedEvents(NamedTuple):
     """Names of the shapes, by the same rule."""
     kind: Integers | None = None
     """Kinds of the blocks at the end, (run, block); None where faces have no types."""
+
+
+class Names:
+    """Names by number, in the order in which they came."""
+
+    def __init__(self, *names: str) -> None:
+        self.known = {name: number for number, name in enumerate(names)}
+
+    def number(self, name: str) -> int:
+        """Return the number of a name, the next one of a new name."""
+        return self.known.setdefault(name, len(self.known))
+
+    def index_into(self, listed: tuple[str, ...]) -> npt.NDArray[np.int32]:
+        """Return from number to place in a list; at its end -1, so that -1 stays what it is."""
+        place = {name: index for index, name in enumerate(listed)}
+        return np.array([*(place[name] for name in self.known), -1], dtype=np.int32)
 
 
 class SquareWorld:
@@ -163,7 +184,7 @@ class DiscWorld(SquareWorld):
     def shape(self, body: int) -> str:
         """Return the name of the contact graph of a body."""
         members = self.members[body]
-        if len(members) > MOST_DISCS:
+        if len(members) > MOST_DISCS and len(self.body) > MOST_NAMED:
             met = (sum(self.body[one] == body for one in self.near[member]) for member in members)
             if max(met) == 2:
                 word = "ring" if self.joins[body] == len(members) else "chain"
@@ -171,7 +192,7 @@ class DiscWorld(SquareWorld):
             return counted_graph(len(members), self.joins[body], self.noun)
         place = {member: index for index, member in enumerate(members)}
         pairs = [(place[a], place[b]) for a in members for b in self.near[a] if b in place]
-        return graph_name(len(members), pairs)
+        return graph_name(len(members), pairs, self.noun)
 
     def touch(self, block: list[int]) -> None:
         """Note that two of them touch."""
@@ -203,7 +224,7 @@ def replay_many(
     blocks: int,
     world_of: Callable[[int], SquareWorld],
 ) -> tuple[ReplayedEvents, tuple[Integers, Integers, Integers]]:
-    """Replay the events of runs of many blocks, return cells, quarters and assemblies after them.
+    """Replay the events of runs one by one, return cells, quarters and assemblies after them.
 
     Parameters
     ----------
@@ -226,13 +247,15 @@ def replay_many(
     runs, slots = block.shape[:2]
     cell = np.zeros((runs, blocks, 2), dtype=np.int64)
     quarter, assembly = (np.zeros((runs, blocks), dtype=np.int64) for _ in range(2))
-    known = {"1": 0}
+    shapes, classes = Names("1"), Names(all_single(blocks))
     event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)
     event_shape = np.full((runs, slots, 3), -1, dtype=np.int32)
+    event_class = np.full((runs, slots), -1, dtype=np.int32)
+    outcome = np.zeros(runs, dtype=np.int32)
     kinds = np.zeros((runs, slots), dtype=np.int64) if kind is None else kind
     for run in range(runs):
         world = world_of(run)
-        shape_of = [0] * blocks
+        shape_of = ["1"] * blocks
         last, told = number[run], kinds[run].tolist()
         for event in range(last):
             of, by = block[run, event].tolist(), face[run, event].tolist()
@@ -240,48 +263,47 @@ def replay_many(
             if told[event] in (OPENING, CLOSING):
                 world.bond(of, whole=told[event] == CLOSING)
                 event_assembly[run, event] = lowest
+                event_class[run, event] = outcome[run]
                 continue
             try:
                 if told[event] == JOINING:
-                    parts = tuple(shape_of[world.body[one]] for one in of)
+                    parts = [shape_of[world.body[one]] for one in of]
                     _touch_all(world, block[run], told, event, last)
-                    stays, _ = world.join(of, by)
+                    stays, moves = world.join(of, by)
                     world.bond(of, whole=True)
-                    became = shape_of[stays] = known.setdefault(world.shape(stays), len(known))
+                    became = shape_of[stays] = world.shape(stays)
+                    shape_of[moves] = ""
                 else:
                     became = shape_of[world.body[of[0]]]
                     two = world.part(of)
                     lowest = [world.lowest[body] for body in two]
-                    for body in two:
-                        shape_of[body] = known.setdefault(world.shape(body), len(known))
-                    parts = tuple(shape_of[body] for body in two)
+                    parts = [world.shape(body) for body in two]
+                    shape_of[two[0]], shape_of[two[1]] = parts
             except InputError as error:
                 raise InputError(f"run {run}, event {event}: {error}") from None
             event_assembly[run, event] = lowest
-            event_shape[run, event] = *parts, became
+            event_shape[run, event] = [shapes.number(one) for one in (*parts, became)]
+            there = [name for name in shape_of if name]
+            named = blocks <= MOST_NAMED
+            name = _class_of(tuple(sorted(there))) if named else counted_class(len(there))
+            outcome[run] = event_class[run, event] = classes.number(name)
         cell[run], quarter[run] = world.cell, world.quarter
         assembly[run] = [world.lowest[body] for body in world.body]
-    # A joining leaves one assembly less, a parting one more; the place of a class among those that
-    # occurred.
-    happened = np.arange(slots) < number[:, None]
-    change = happened * ((kinds == PARTING).astype(np.int64) - (kinds == JOINING))
-    left = blocks + change.cumsum(axis=1)
-    at_end = blocks + change.sum(axis=1)
-    occurred = np.unique(np.concatenate([[blocks], at_end, left[happened]]))
-    place = np.full(blocks + 1, -1, dtype=np.int32)
-    place[occurred] = np.arange(occurred.size)
-    shapes = tuple(sorted(known, key=shape_order))
-    index = {name: at for at, name in enumerate(shapes)}
-    shape_at = np.array([*(index[name] for name in known), -1], dtype=np.int32)
+    listed = tuple(sorted(shapes.known, key=shape_order)), sort_classes(classes.known)
+    shape_index, class_index = shapes.index_into(listed[0]), classes.index_into(listed[1])
     found = ReplayedEvents(
         event_assembly,
-        shape_at[event_shape],
-        np.where(happened, place[left], np.int32(-1)),
-        place[at_end],
-        tuple(counted_class(int(one)) for one in occurred),
-        shapes,
+        shape_index[event_shape],
+        class_index[event_class],
+        class_index[outcome],
+        listed[1],
+        listed[0],
     )
     return found, (cell, quarter, assembly)
+
+
+# Many runs meet in the same worlds.
+_class_of = lru_cache(maxsize=1 << 14)(class_name)
 
 
 def _touch_all(
