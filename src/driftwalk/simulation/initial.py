@@ -115,3 +115,15 @@ def world_orientations(theta: npt.ArrayLike, keys: Keys) -> Floats:
         word = _core.philox(int(keys[index]), [0, 0, 0, Purpose.START])[0]
         given[index] = (word * 2.0**-31 - 1.0) * np.pi
     return given
+
+
+def world_table(
+    start: Start, keys: Keys, *, drag_coefficient: npt.ArrayLike, force_std: npt.ArrayLike
+) -> Floats:
+    """Return start poses [m, rad], motions [m/s, rad/s] and parameters of worlds, shape (n, 8).
+
+    A world without an orientation draws its own.
+    """
+    begin = start._replace(theta=world_orientations(start.theta, keys))
+    values = (np.asarray(one, np.float64) for one in (*begin, drag_coefficient, force_std))
+    return np.ascontiguousarray(np.stack(np.broadcast_arrays(*values), axis=1))
