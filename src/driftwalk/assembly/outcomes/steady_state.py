@@ -167,16 +167,11 @@ def _stays(assembly: xr.Dataset, sound: Bools, start: int) -> _Stays:
 
 def _shares(stays: _Stays, edges: Floats, runs: int, classes: int) -> Floats:
     """Return the share of each class in each piece of time of each run, (run, piece, class)."""
-    pieces = edges.size - 1
-    shares = np.zeros((runs, pieces, classes))
-    for piece in range(pieces):
-        low, high = edges[piece], edges[piece + 1]
-        within = np.minimum(stays.begin + stays.lasts, high) - np.maximum(stays.begin, low)
-        np.add.at(
-            shares,
-            (stays.run, np.full_like(stays.run, piece), stays.state),
-            np.maximum(within, 0.0) / (high - low),
-        )
+    shares = np.zeros((runs, edges.size - 1, classes))
+    low, high, begin = edges[:-1], edges[1:], stays.begin[:, None]
+    within = np.minimum(begin + stays.lasts[:, None], high) - np.maximum(begin, low)
+    place: Any = stays.run, slice(None), stays.state
+    np.add.at(shares, place, np.maximum(within, 0.0) / (high - low))
     return shares
 
 
