@@ -5,6 +5,7 @@ A controller turns what is seen into modes, in simulated worlds and in real ones
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from driftwalk.assembly.control.decision_process import Decisions, age_bin, phase_of
 from driftwalk.assembly.control.modes import Modes
-from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.sweep import WorkUnit
@@ -214,10 +215,7 @@ class Worlds:
         controller = Controller(self.rules, world - self.first)
         draw = (world - self.first) // self.turn + self.first // self.turn
         number = {name: at for at, name in enumerate(self.classes)}
-        found = {
-            name: np.empty((world.size, periods), dtype=np.int16)
-            for name in ("seen", "age", "mode", "after", "entered", "free")
-        }
+        found: dict[str, list[Integers | Bools]] = defaultdict(list)
         seen = numbers(batch.outcome, number)
         for period in range(periods):
             since = np.asarray(batch.class_since)
@@ -230,13 +228,13 @@ class Worlds:
             batch.advance(every - (latency if period > 0 else 0.0))
             after = numbers(batch.outcome, number)
             entered = (after != seen) | (np.asarray(batch.class_since) > since)
-            for name, values in (
-                ("seen", seen), ("age", age), ("mode", mode), ("after", after),
-                ("entered", entered), ("free", controller.free),
-            ):  # fmt: skip
-                found[name][:, period] = values
+            for name, values in {
+                "seen": seen, "age": age, "mode": mode, "after": after,
+                "entered": entered, "free": controller.free,
+            }.items():  # fmt: skip
+                found[name].append(values)
             seen = after
-        return found
+        return {name: np.stack(row, axis=1).astype(np.int16) for name, row in found.items()}
 
     def _drawn(self, world: Integers) -> tuple[Integers, Integers]:
         """Return the modes that are wished for, and where the look gives no class."""
@@ -244,9 +242,7 @@ class Worlds:
         wish = np.full((world.size, periods), -1)
         lost = np.zeros((world.size, periods), dtype=bool)
         if self.arm == "constant":
-            wish[:] = (world % modes if self.only is None else np.full(world.size, self.only))[
-                :, None
-            ]
+            wish[:] = (world % modes)[:, None] if self.only is None else self.only
         if self.arm == "random" or self.wanted.missed > 0.0:
             for row, number in enumerate(world.tolist()):
                 random = np.random.default_rng([self.seed, number, STREAM])

@@ -51,7 +51,9 @@ class Emulator(NamedTuple):
     solved: Floats
     """Inverse covariance times what the nodes say, shape (category, node)."""
 
+    # Small matrices: more threads would mostly wait for each other.
     @classmethod
+    @one_blas_thread()
     def fitted(cls, node: Floats, count: Integers) -> Self:
         """Return the emulator of the counts of nodes, by the largest posterior of its scales.
 
@@ -62,12 +64,6 @@ class Emulator(NamedTuple):
         count : ndarray of int, shape (nodes, categories)
             Simulated runs of each category.
         """
-        # Small matrices: more threads would mostly wait for each other.
-        with one_blas_thread():
-            return cls._fitted(node, count)
-
-    @classmethod
-    def _fitted(cls, node: Floats, count: Integers) -> Self:
         from scipy.linalg import cho_solve
         from scipy.special import digamma, polygamma
 
