@@ -170,22 +170,17 @@ def _listed(rows: list[tuple[list[str], Floats, float]], names: tuple[str, ...])
 
 
 def _of_runs(assembly: xr.Dataset) -> list[tuple[list[str], Floats, float]]:
-    """Return class names, entry times and end of every run; joinings and partings in order."""
+    """Return class names, entry times and end of every run."""
     names = [str(name) for name in assembly["class"].values]
     start = all_single(int(assembly.attrs["blocks"]))
-    kinds = [one for one in ("event", "split") if f"{one}_time" in assembly]
-    time = np.concatenate([assembly[f"{one}_time"].values for one in kinds], axis=1)
-    after = np.concatenate([assembly[f"{one}_class"].values for one in kinds], axis=1)
-    order = np.argsort(np.where(np.isfinite(time), time, np.inf), axis=1, kind="stable")
-    time, after = (np.take_along_axis(one, order, axis=1) for one in (time, after))
-    end = assembly["end_time"].values
+    time, after, end = (assembly[name].values for name in ("event_time", "event_class", "end_time"))
     real = np.isfinite(time) & (after >= 0)
     rows = []
     for at in np.flatnonzero(assembly["outcome"].values >= 0):
         passed = [start, *(names[index] for index in after[at, real[at]].tolist())]
         entry = np.concatenate([[0.0], time[at, real[at]]])
         begun = int((entry == 0.0).nonzero()[0][-1])  # glued blocks join at time 0
-        rows.append(_merged(passed[begun:], entry[begun:], float(end[at])))
+        rows.append((*merged_history(passed[begun:], entry[begun:]), float(end[at])))
     return rows
 
 
@@ -196,10 +191,10 @@ def _of_recording(found: xr.Dataset) -> list[tuple[list[str], Floats, float]]:
         return []
     time: npt.NDArray[Any] = found["time"].values[known]
     names = found["class"].values[found["outcome"].values[known]]
-    return [_merged([str(name) for name in names], time, float(time[-1]))]
+    return [(*merged_history([str(name) for name in names], time), float(time[-1]))]
 
 
-def _merged(passed: list[str], entry: Floats, end: float) -> tuple[list[str], Floats, float]:
-    """Return a history in which a class is entered only from another one."""
+def merged_history(passed: list[str], entry: Floats) -> tuple[list[str], Floats]:
+    """Return a history, names and entry times, in which a class is entered only from another."""
     fresh = [0, *(k for k in range(1, len(passed)) if passed[k] != passed[k - 1])]
-    return [passed[k] for k in fresh], entry[fresh], end
+    return [passed[k] for k in fresh], entry[fresh]

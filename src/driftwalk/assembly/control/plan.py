@@ -486,11 +486,7 @@ def stored_modes(policy: xr.Dataset) -> Modes:
 
     about = {"kind": "flow_field", "schema_version": 1, "arena": policy.attrs["arena"]}
     fields = (
-        xr.Dataset(
-            {name: (("y", "x"), policy[name].values[at]) for name in ("u", "v", "flag")},
-            {name: (name, policy[name].values) for name in ("y", "x")},
-            about,
-        )
+        xr.Dataset(policy[["u", "v", "flag"]].isel(field=at), attrs=about)
         for at in range(policy.sizes["field"])
     )
     return Modes(

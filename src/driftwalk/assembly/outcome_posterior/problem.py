@@ -6,8 +6,7 @@ others.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -116,25 +115,17 @@ class Nodes:
         apart = {
             INFERRED_KEYS[name]: column[name] for name in self.names if name not in OF_EACH_RUN
         }
-        studies = [self.study]
-        if apart:
-            studies = [
-                apply_overrides(self.study, {key: float(row[at]) for key, row in apart.items()})
-                for at in range(len(value))
-            ]
+        studies = [
+            apply_overrides(self.study, {key: float(row[at]) for key, row in apart.items()})
+            for at in range(len(value) if apart else 1)
+        ]
         worlds = [world_plan(one, self.flow, threads=self.threads) for one in studies]
-        world = np.arange(len(value)) if apart else np.zeros(len(value), dtype=np.int64)
+        world = np.arange(len(value)) % len(worlds)
         along = {name: column[name] for name in self.names if name in OF_EACH_RUN}
         return make_settings(worlds, world, first_trial=self.first_trial + rows.start, **along)
 
-    def simulate(
-        self,
-        *,
-        store: Store | None = None,
-        progress: Callable[[int, int], None] | None = None,
-        executor: Executor | None = None,
-    ) -> list[list[Record]]:
-        """Simulate all nodes, skipping what a store holds already.
+    def simulate(self, store: Store | None = None, **how: Any) -> list[list[Record]]:
+        """Simulate all nodes, `how` as for `run_sweep`, skipping what a store holds already.
 
         Raises
         ------
@@ -145,7 +136,7 @@ class Nodes:
         steps = self.study.sensitivity.runs * assembly.duration_s / self.study.time_step_s
         nodes = len(self.value)
         units = grid(node=np.arange(nodes)).units(settings_per_unit(nodes, steps * assembly.blocks))
-        found = sweep_texts(self, units, store=store, progress=progress, executor=executor)
+        found = sweep_texts(self, units, store=store, **how)
         records = [records_from_text(text) for text in found["records"].tolist()]
         if not all(records):
             raise InputError("all runs of a node broke down: use a smaller time step")

@@ -228,7 +228,6 @@ def _lifetimes(stays: _Stays, classes: int, confidence: float) -> tuple[Floats, 
         own = real & (stays.state == state)
         over = np.where(stays.ends_by[own] >= 0, stays.lasts[own], np.nan)
         found = survival_curve(over, stays.lasts[own], times=age, confidence=confidence)
-        curve[:, :, state] = found.survival, found.low, found.high
-        median[:, state] = found.median, found.median_low, found.median_high
+        curve[:, :, state], median[:, state] = found[:3], found[3:]
     curves = with_limits("survival", ("age", "class"), *curve)
     return age, curves | with_limits("lifetime_median", "class", *median)

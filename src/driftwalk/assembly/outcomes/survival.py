@@ -123,12 +123,9 @@ def class_times(
         curve = survival_curve(
             assembly[f"{event}_time"].values[sound], end_time, times=time, confidence=confidence
         )
-        data |= with_limits(event, "time", curve.survival, curve.low, curve.high)
-        attrs |= {
-            f"{event}_median_s": curve.median,
-            f"{event}_median_low_s": curve.median_low,
-            f"{event}_median_high_s": curve.median_high,
-        }
+        data |= with_limits(event, "time", *curve[:3])
+        medians = (f"{event}_median{end}_s" for end in ("", "_low", "_high"))
+        attrs |= dict(zip(medians, curve[3:], strict=True))
     return build_dataset(
         "class_times",
         data,
