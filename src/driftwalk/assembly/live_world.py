@@ -352,8 +352,7 @@ class LiveTank:
     @property
     def assembly(self) -> npt.NDArray[np.int32]:
         """Lowest block of each block's assembly: blocks with equal numbers are joined."""
-        labels: npt.NDArray[np.int32] = self._moment.state["assembly"].copy()
-        return labels
+        return self._moment.state["assembly"].copy()
 
     @property
     def poles(self) -> npt.NDArray[np.int32]:

@@ -67,8 +67,7 @@ class Histories(NamedTuple):
     def entry(self) -> Floats:
         """When each sojourn began, from the start of its run [s]."""
         before = np.cumsum(self.duration) - self.duration
-        entry: Floats = before - np.maximum.accumulate(np.where(self.first, before, 0.0))
-        return entry
+        return before - np.maximum.accumulate(np.where(self.first, before, 0.0))
 
     def until(self, end: float) -> Histories:
         """Return what is seen of the histories up to a time from the start of their runs [s]."""

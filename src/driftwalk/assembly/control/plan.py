@@ -67,8 +67,7 @@ class Cells(NamedTuple):
 
     def best(self) -> Integers:
         """Return the mode of each cell with the largest mean, shape (phase, class, age bin)."""
-        best: Integers = (self.reached / (self.reached + self.failed)).argmax(axis=-1)
-        return best
+        return np.asarray((self.reached / (self.reached + self.failed)).argmax(axis=-1))
 
     def drawn(self, worlds: int, random: np.random.Generator) -> Integers:
         """Return modes for worlds, shape (world, phase, class, age bin)."""

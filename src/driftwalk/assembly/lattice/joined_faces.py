@@ -199,17 +199,16 @@ class PairPoses(NamedTuple):
 
 def _joins_of_pair(
     poses: Poses, blocks: tuple[int, int], both: Bools, rules: JoinRules
-) -> list[Join]:
+) -> Iterator[Join]:
     at = np.flatnonzero(both)
     pair = poses.pair(blocks, at)
     # The centres of blocks that fit are hardly farther apart than a side.
     if not (np.hypot(*pair.apart) <= rules.side + rules.join_distance).any():
-        return []
+        return
     nearest = pair.nearest_faces()
     distance, angle = pair.misfit(nearest, rules.side)
     fits = (distance <= rules.join_distance) & (angle <= rules.join_angle)
     kind = np.where(fits, 4 * nearest[0] + nearest[1], -1)
-    joins = []
     start = first_streak(pair.time, kind, 0, rules)
     while start is not None:
         faces = nearest[:, start]
@@ -217,17 +216,14 @@ def _joins_of_pair(
         beyond = (distance > rules.release_distance) | (angle > rules.release_angle)
         stop = first_streak(pair.time, np.where(beyond, 0, -1), start, rules)
         looseness = np.maximum(distance / rules.join_distance, angle / rules.join_angle)
-        joins.append(
-            Join(
-                blocks,
-                (int(faces[0]), int(faces[1])),
-                int(at[start]),
-                int(at[stop]) if stop is not None else len(poses.time),
-                float(np.median(looseness[start:stop])),
-            )
+        yield Join(
+            blocks,
+            (int(faces[0]), int(faces[1])),
+            int(at[start]),
+            int(at[stop]) if stop is not None else len(poses.time),
+            float(np.median(looseness[start:stop])),
         )
         start = None if stop is None else first_streak(pair.time, kind, stop, rules)
-    return joins
 
 
 def first_streak(time: Floats, kind: Integers, begin: int, rules: JoinRules) -> int | None:
@@ -429,8 +425,7 @@ def rigid_joins(
 
 
 def _size(lie: Floats) -> Floats:
-    size: Floats = np.sqrt((lie**2).sum(axis=0))
-    return size
+    return np.asarray(np.sqrt((lie**2).sum(axis=0)))
 
 
 def _stretches(contact: Contact, rules: JoinRules, play: float) -> Iterator[Stretch]:

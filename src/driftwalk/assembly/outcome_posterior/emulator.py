@@ -123,8 +123,7 @@ def _fitted_scales(node: Floats, said: Floats, noise: Floats) -> Floats:
 
     start = np.r_[np.log(max(said.var(), 0.1)), np.full(node.shape[1], np.log(policy.length))]
     bounds = [(-7.0, 7.0), *[(np.log(0.03), np.log(20.0))] * node.shape[1]]
-    best: Floats = minimize(loss, start, method="L-BFGS-B", bounds=bounds).x
-    return best
+    return np.asarray(minimize(loss, start, method="L-BFGS-B", bounds=bounds).x)
 
 
 def log_likelihoods(mean: Floats, variance: Floats, count: Integers, *, seed: int = 0) -> Floats:

@@ -220,8 +220,7 @@ class Runs:
 
     def share(self, arm: int) -> Floats:
         """Return the share of the runs of an arm that have the target, over time."""
-        found: Floats = self._counts[arm] / self.tally.size(arm)
-        return found
+        return np.asarray(self._counts[arm] / self.tally.size(arm))
 
     def cautious(self, arm: int) -> Floats:
         """Return the share less its standard error, over time: few runs are no merit."""
