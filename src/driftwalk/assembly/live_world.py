@@ -164,7 +164,6 @@ class LiveTank:
                 plan.study, self._next_settings.flow_scale
             )
             self._set_forces()
-            self._set_pull()
             self._steps_per_interval = round(forces.force_interval_s / plan.study.time_step_s)
             self._due = 0.0
             self._events: list[LiveEvent] = []
@@ -393,12 +392,9 @@ class LiveTank:
             following = self._next_settings
             changed = following is not self._active
             before = self._active.study.assembly
-            self._next_settings = self._active = (
-                following._replace(part=False) if following.part else following
-            )
+            self._next_settings = self._active = following._replace(part=False)
         if changed:
             self._set_forces()
-            self._set_pull()
             rules = self._active.study.assembly
             self._world.set_rules(
                 latching=rules.latching,
@@ -419,15 +415,12 @@ class LiveTank:
             self._look()
 
     def _set_forces(self) -> None:
-        forces = self._active.study.forces
+        forces, pull = self._active.study.forces, block_pull(self._active.study)
         self._world.set_forces(
             drag_coefficient=forces.drag_coefficient,
             force_std=forces.force_std_N,
             flow_scale=self._active.flow_scale,
         )
-
-    def _set_pull(self) -> None:
-        pull = block_pull(self._active.study)
         self._world.set_pull(None if pull is None else pull.native)
 
     def _step(self, steps: int) -> None:

@@ -53,15 +53,8 @@ class Histories(NamedTuple):
 
     def of(self, chosen: Bools) -> Histories:
         """Return the histories of chosen runs, shape (run,), numbered from 0."""
-        kept = chosen[self.run]
-        number = np.cumsum(chosen) - 1
-        return self._replace(
-            run=number[self.run[kept]],
-            state=self.state[kept],
-            duration=self.duration[kept],
-            target=self.target[kept],
-            runs=int(chosen.sum()),
-        )
+        found, number = self._sojourns(chosen[self.run]), np.cumsum(chosen) - 1
+        return found._replace(run=number[found.run], runs=int(chosen.sum()))
 
     @property
     def entry(self) -> Floats:
@@ -74,12 +67,11 @@ class Histories(NamedTuple):
         begun = self.entry < end
         left = np.minimum(self.duration, end - self.entry)
         target = np.where(left < self.duration, OPEN, self.target)
-        return self._replace(
-            run=self.run[begun],
-            state=self.state[begun],
-            duration=left[begun],
-            target=target[begun],
-        )
+        return self._replace(duration=left, target=target)._sojourns(begun)
+
+    def _sojourns(self, kept: Bools) -> Histories:
+        columns = ("run", "state", "duration", "target")
+        return self._replace(**{name: getattr(self, name)[kept] for name in columns})
 
     def recorded_s(self) -> float:
         """Return the length of the longest run [s]."""
@@ -148,24 +140,14 @@ def blocks_of(name: str) -> int:
 
 def _listed(rows: list[tuple[list[str], Floats, float]], names: tuple[str, ...]) -> Histories:
     place = {name: index for index, name in enumerate(names)}
-    run, state, target = [], [], []
-    duration: list[Floats] = []
-    for number, (passed, entry, end) in enumerate(rows):
-        run += [number] * len(passed)
-        state += [place[name] for name in passed]
-        target += [*(place[name] for name in passed[1:]), OPEN]
-        duration += [entry[1:] - entry[:-1], np.array([end - entry[-1]])]
-    lasts = np.concatenate(duration)
+    run = np.repeat(np.arange(len(rows)), [len(passed) for passed, _, _ in rows])
+    state = np.array([place[name] for passed, _, _ in rows for name in passed], dtype=np.int64)
+    target = np.append(state[1:], OPEN)
+    target[np.flatnonzero(np.diff(run))] = OPEN
+    lasts = np.concatenate([np.diff(entry, append=end) for _, entry, end in rows])
     # Two events of one time step: the class between them lasted less than the step.
     shortest = lasts[lasts > 0].min(initial=1.0)
-    return Histories(
-        names,
-        np.array(run, dtype=np.int64),
-        np.array(state, dtype=np.int64),
-        np.maximum(lasts, 0.5 * shortest),
-        np.array(target, dtype=np.int64),
-        len(rows),
-    )
+    return Histories(names, run, state, np.maximum(lasts, 0.5 * shortest), target, len(rows))
 
 
 def _of_runs(assembly: xr.Dataset) -> list[tuple[list[str], Floats, float]]:

@@ -221,11 +221,9 @@ def trial_setting(
     InputError
         When a number is out of range.
     """
-    wanted = stored_wanted(policy)
-    if latency is not None:
-        wanted = replace(wanted, latency_s=latency)
-    if missed is not None:
-        wanted = replace(wanted, missed=missed)
+    given = {"latency_s": latency, "missed": missed}
+    over: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    wanted = replace(stored_wanted(policy), **over)
     if worlds < 20:
         raise InputError(f"at least 20 worlds are needed, got {worlds}")
     wanted.require_in_range()
