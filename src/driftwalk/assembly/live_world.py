@@ -20,12 +20,12 @@ from driftwalk.assembly.runs.plan import make_plan, start_poses, steps_of
 from driftwalk.assembly.runs.start import glued_cells, require_bonds, require_room
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.model import Study, apply_overrides
 from driftwalk.simulation.backend import BROKEN
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
     from driftwalk.model.assembly import HiddenFaceDrag, Latching
 
 
@@ -248,8 +248,6 @@ class LiveTank:
         InputError
             When a value is out of range or the blocks cannot fit the tank. Nothing changes then.
         """
-        from driftwalk.model import apply_overrides
-
         given = {
             "forces.drag_coefficient": drag_coefficient,
             "forces.force_std_N": force_std,

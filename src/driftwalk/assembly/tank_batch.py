@@ -25,12 +25,12 @@ from driftwalk.assembly.runs.plan import (
 from driftwalk.assembly.runs.start import glued_cells, require_room
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
+from driftwalk.model import Study, apply_overrides
 from driftwalk.simulation.backend import BROKEN
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
 
 State = Mapping[str, npt.NDArray[Any]]
 Complete = Literal["moves", "rests"]
@@ -376,8 +376,6 @@ class TankBatch:
 
     def _latching(self, names: npt.NDArray[np.str_]) -> npt.NDArray[np.int32]:
         """Return the native core's numbers of ways to latch, after checking them."""
-        from driftwalk.model import apply_overrides
-
         number = np.zeros(names.size, dtype=np.int32)
         for name in np.unique(names).tolist():
             require_room(apply_overrides(self._study, {"assembly.latching": name}))

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.model import Study, apply_overrides
 from driftwalk.schema.tracking_noise import estimate_tracking_noise, noise_bound
 from driftwalk.simulation.backend import Camera
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
     from driftwalk.schema import Track
 
 
@@ -162,8 +162,6 @@ def study_as_seen(study: Study, recording: xr.Dataset, track: Track) -> Study:
     >>> round(seen.position_noise_m, 4)
     0.0003
     """
-    from driftwalk.model import apply_overrides
-
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
     camera = recorded_camera(track, study, position_quantum=quantum)
     return apply_overrides(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +13,7 @@ from driftwalk import _core
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import Purpose
-
-if TYPE_CHECKING:
-    from driftwalk.model import Study, Tank
+from driftwalk.model import Study, Tank
 
 Fits = Callable[[float, float, float], bool]
 """Whether there is room for a pose x, y [m], theta [rad]."""

@@ -18,7 +18,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +26,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import ConfigurationError
-
-if TYPE_CHECKING:
-    from driftwalk.model import Assembly
+from driftwalk.model import Assembly
 
 QUARTER: Final = math.pi / 2
 """A turn from one face of a square block to the next [rad]."""

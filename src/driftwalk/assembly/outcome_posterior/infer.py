@@ -43,6 +43,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.progress import ignore_progress
 from driftwalk.core.study_keys import INFERRED_KEYS
 from driftwalk.core.units import in_percent
+from driftwalk.model import Study, declared
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.answers.outcome_posterior import (
     BOTH_ENDS,
@@ -59,7 +60,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from driftwalk.model import Study
     from driftwalk.sweep import Store
 
 Progress = Callable[[int, int], None]
@@ -389,8 +389,6 @@ def _classes(
 
 
 def _unit(name: str) -> str:
-    from driftwalk.model import declared
-
     quantity = declared(INFERRED_KEYS[name]).quantity
     return "1" if quantity is None else quantity.unit
 

@@ -43,13 +43,12 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.study_keys import INFERRED_KEYS, INFERRED_RANGES
+from driftwalk.model import Study, apply_overrides
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.sweep import Store, WorkUnit, grid, settings_per_unit
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from driftwalk.model import Study
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +107,6 @@ class Nodes:
         InputError
             When the blocks of a node have no room, or its flow does not cover the tank.
         """
-        from driftwalk.model import apply_overrides
-
         value = self.value[rows.start : rows.stop]
         column = dict(zip(self.names, value.T, strict=True))
         apart = {
@@ -207,8 +204,6 @@ class OutcomeProblem:
 
     def nodes(self, point: Floats, first_trial: int, runs: int | None = None) -> Nodes:
         """Return simulations at points of the unit cube."""
-        from driftwalk.model import apply_overrides
-
         study = self.study
         if runs is not None:
             study = apply_overrides(study, {"sensitivity.runs": runs})
@@ -254,8 +249,6 @@ def check_outcomes(
     """
     import xarray as xr
 
-    from driftwalk.model import Study, apply_overrides
-
     given: Any = [outcomes] if isinstance(outcomes, xr.Dataset) else outcomes
     chosen = Study() if study is None else study
     observed = observed_of(given, after=after, breaks=chosen.assembly.bonds_break)
@@ -285,8 +278,6 @@ def _ranges(
     vary: Mapping[str, tuple[float, float]], study: Study
 ) -> tuple[tuple[str, ...], Floats, Floats]:
     """Return names and ranges of the parameters."""
-    from driftwalk.model import apply_overrides
-
     for name, ends in vary.items():
         if name not in INFERRED_KEYS:
             raise InputError(f"vary: there is no '{name}'; choose from {', '.join(INFERRED_KEYS)}")

@@ -41,6 +41,7 @@ from driftwalk.assembly.lattice.polyomino import (
 )
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.model import Study, parse_study
 from driftwalk.schema.check import require_kind
 from driftwalk.schema.shapes import (
     MOST_NAMED,
@@ -54,8 +55,6 @@ from driftwalk.schema.shapes import (
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from driftwalk.model import Study
 
 
 MOST_BLOCKS = 8
@@ -375,8 +374,6 @@ def kind_classes(assembly: xr.Dataset) -> dict[str, int]:
     >>> dw.assembly.kind_classes(found)
     {'1:A+1:B': 3}
     """
-    from driftwalk.model import parse_study
-
     require_kind(assembly, "assembly")
     if "kind" not in assembly:
         raise InputError(

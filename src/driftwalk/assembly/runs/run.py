@@ -28,12 +28,12 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.progress import Progress
+from driftwalk.model import Study, apply_overrides
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, settings_per_unit, threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
 
 FlowDraws = Literal["standard_error", "none"]
 
@@ -373,8 +373,6 @@ def _by_draw(plan: Plan, first: int, last: int) -> Sequence[tuple[slice, Plan]]:
 
 def _drawn(plan: Plan, row: int) -> Plan:
     """Return the plan with the drawn flow and the drawn force law of a row."""
-    from driftwalk.model import apply_overrides
-
     law = {key: float(values[row]) for key, values in plan.law.items()}
     study, flow = apply_overrides(plan.study, law) if law else plan.study, plan.flow
     if plan.flow_draw is not None:

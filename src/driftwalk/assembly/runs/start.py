@@ -7,7 +7,7 @@ and the number of events of a run is limited.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,11 +17,9 @@ from driftwalk.assembly.outcomes.outcome_classes import overlap_depth
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
+from driftwalk.model import Assembly, Study, Tank
 from driftwalk.schema.shapes import STEPS, cells_of_shape
 from driftwalk.simulation.backend import wall_depth
-
-if TYPE_CHECKING:
-    from driftwalk.model import Assembly, Study, Tank
 
 
 def require_bonds(study: Study) -> None:
