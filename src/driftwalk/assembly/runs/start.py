@@ -7,7 +7,6 @@ and the number of events of a run is limited.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -53,15 +52,6 @@ def require_bonds(study: Study) -> None:
             "glued blocks (`assembly.glued`) never part: let them start alone, or leave the bonds "
             "permanent (`assembly.bond_rate_per_s` of 0)"
         )
-
-
-def bond_attrs(study: Study) -> dict[str, Any]:
-    """Return the attributes that say how bonds break; none where they are permanent."""
-    rules = study.assembly
-    if not rules.bonds_break:
-        return {}
-    names = ("bond_rate_per_s", "bond_force_N", "bond_strength_N", "relatch_clearance")
-    return {name: float(getattr(rules, name)) for name in names}
 
 
 def with_event_rows(arrays: Arrays, rows: int) -> Arrays:
