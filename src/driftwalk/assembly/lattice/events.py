@@ -1,4 +1,4 @@
-"""Replay the events of simulated runs on the lattice, all runs side by side.
+"""Replay the events of simulated runs on the lattice, and refuse those that cannot be.
 
 The native core gives, for each event, the two blocks and the faces that joined. Everything else
 follows: which assemblies they were, what shapes these had, and the outcome class of the world.
@@ -12,31 +12,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.joined_faces import (
-    CLOSING,
-    JOINING,
-    OPENING,
-    PARTING,
-    BondGraph,
-    FaceTable,
-)
-from driftwalk.assembly.lattice.many_blocks import (
-    DiscWorld,
-    Names,
-    ReplayedEvents,
-    SquareWorld,
-    replay_many,
-)
-from driftwalk.assembly.lattice.polyomino import Chirality, name_of, require_chirality
-from driftwalk.assembly.outcomes.outcome_classes import (
-    class_name,
-    contact_pairs,
-    listed_classes,
-    listed_shapes,
-)
+from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, FaceTable
+from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
+from driftwalk.assembly.lattice.replay import DiscWorld, ReplayedEvents, SquareWorld, replay
+from driftwalk.assembly.outcomes.outcome_classes import contact_pairs
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.shapes import MOST_NAMED, STEPS, all_single, moved_to_origin
 
 
 def replay_events(
@@ -104,11 +85,8 @@ def replay_events(
     _check_arrays(events, end)
     blocks = end.assembly.shape[1]
     kind = None if faces is None else _follow_kinds(events, faces, end.assembly.shape)
-    if blocks > MOST_NAMED:
-        many = _replay_many(events, end, lambda _: SquareWorld(blocks, chirality))
-        return many._replace(kind=kind)
-    replay = _Replay(end.assembly.shape, events, chirality)
-    return replay.result(events, end)._replace(kind=kind)
+    found = _replayed(events, end, chirality, lambda _: SquareWorld(blocks, chirality))
+    return found._replace(kind=kind)
 
 
 def replay_contacts(
@@ -156,13 +134,17 @@ def replay_contacts(
         pairs = [] if told else contact_pairs(pose[run], diameter=diameter, width=width)
         return DiscWorld(pose.shape[1], pairs, noun=noun)
 
-    return _replay_many(events, end, world_of)
+    return _replayed(events, end, None, world_of)
 
 
-def _replay_many(
-    events: _Events, end: _Lattice, world_of: Callable[[int], SquareWorld]
+def _replayed(
+    events: _Events,
+    end: _Lattice,
+    chirality: Chirality | None,
+    world_of: Callable[[int], SquareWorld],
 ) -> ReplayedEvents:
-    found, state = replay_many(*events, blocks=end.assembly.shape[1], world_of=world_of)
+    blocks = end.assembly.shape[1]
+    found, state = replay(*events, blocks=blocks, chirality=chirality, world_of=world_of)
     _check_end(_Lattice(*state), end)
     return found
 
@@ -194,142 +176,6 @@ class _Lattice(NamedTuple):
     cell: Integers
     quarter: Integers
     assembly: Integers
-
-
-class _Replay:
-    """The state of the squares of all runs while their events are applied."""
-
-    def __init__(self, shape: tuple[int, ...], events: _Events, chirality: Chirality) -> None:
-        runs, blocks = shape
-        slots = events.block.shape[1]
-        self.bonds = None if events.kind is None else BondGraph(runs, blocks)
-        self.chirality = chirality
-        self.blocks = blocks
-        self.lattice = _Lattice(
-            np.zeros((runs, blocks, 2), dtype=np.int64),
-            np.zeros((runs, blocks), dtype=np.int64),
-            np.tile(np.arange(blocks), (runs, 1)),
-        )
-        self.shapes, self.classes = Names("1"), Names(all_single(blocks))
-        # The number of the shape at the lowest block of each assembly, -1 at the other blocks.
-        self.shape_of = np.zeros((runs, blocks), dtype=np.int64)
-        self.event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)
-        self.event_shape = np.full((runs, slots, 3), -1, dtype=np.int32)
-        self.event_class = np.full((runs, slots), -1, dtype=np.int32)
-        self.outcome = np.zeros(runs, dtype=np.int32)
-
-    def apply(self, event: int, at: Integers, events: _Events) -> None:
-        """Apply the event of this number to the runs that have it."""
-        if self.bonds is None or events.kind is None:
-            self._join(event, at, events)
-            return
-        kind = events.kind[at, event]
-        for number, change in ((JOINING, self._join), (PARTING, self._part)):
-            if (kind == number).any():
-                change(event, at[kind == number], events)
-        for number in (JOINING, OPENING, CLOSING):
-            own = at[kind == number]
-            self.bonds.put(own, events.block[own, event], number != OPENING)
-        loop = at[kind >= OPENING]
-        labels = self.lattice.assembly[loop]
-        self.event_assembly[loop, event] = np.take_along_axis(
-            labels, events.block[loop, event], axis=1
-        )
-        self.event_class[loop, event] = self.outcome[loop]
-
-    def _join(self, event: int, at: Integers, events: _Events) -> None:
-        labels = self.lattice.assembly[at]
-        own = np.take_along_axis(labels, events.block[at, event], axis=1)
-        _refuse(own[:, 0] == own[:, 1], at, event, "joins two blocks of one assembly")
-        self.event_assembly[at, event] = own
-        self.event_shape[at, event, :2] = np.take_along_axis(self.shape_of[at], own, axis=1)
-        self._align(at, events.block[at, event], events.face[at, event])
-        low, high = own.min(axis=1), own.max(axis=1)
-        member = (labels == low[:, None]) | (labels == high[:, None])
-        self.lattice.assembly[at] = np.where(member, low[:, None], labels)
-        became = self._shape_numbers(at, event, member)
-        self.shape_of[at, high] = -1
-        self.shape_of[at, low] = became
-        self.event_shape[at, event, 2] = became
-        self.outcome[at] = self.event_class[at, event] = self._class_numbers(at)
-
-    def _part(self, event: int, at: Integers, events: _Events) -> None:
-        """Cut an assembly of each run where a bond of it breaks."""
-        if self.bonds is None:
-            return
-        block, labels = events.block[at, event], self.lattice.assembly[at]
-        own = np.take_along_axis(labels, block, axis=1)
-        self.bonds.put(at, block, False)
-        first = self.bonds.reached(at, block[:, 0])
-        whole = np.take_along_axis(first, block[:, 1:], axis=1)[:, 0] | (own[:, 0] != own[:, 1])
-        _refuse(whole, at, event, "parts two blocks that are not held by that bond alone")
-        self.event_shape[at, event, 2] = self.shape_of[at, own[:, 0]]
-        for side, member in enumerate((first, (labels == own[:, :1]) & ~first)):
-            lowest = member.argmax(axis=1)
-            self.lattice.assembly[at] = np.where(member, lowest[:, None], self.lattice.assembly[at])
-            shape = self._shape_numbers(at, event, member)
-            self.shape_of[at, lowest] = shape
-            self.event_assembly[at, event, side] = lowest
-            self.event_shape[at, event, side] = shape
-        self.outcome[at] = self.event_class[at, event] = self._class_numbers(at)
-
-    def result(self, events: _Events, end: _Lattice) -> ReplayedEvents:
-        """Apply all events, and return what they did; refuse those that lead elsewhere."""
-        for event in range(int(events.number.max(initial=0))):
-            self.apply(event, np.flatnonzero(events.number > event), events)
-        _check_end(self.lattice, end)
-        shapes = listed_shapes(self.shapes.known, self.blocks, chirality=self.chirality)
-        classes = listed_classes(self.classes.known, self.blocks, chirality=self.chirality)
-        shape_index, class_index = self.shapes.index_into(shapes), self.classes.index_into(classes)
-        return ReplayedEvents(
-            self.event_assembly,
-            shape_index[self.event_shape],
-            class_index[self.event_class],
-            class_index[self.outcome],
-            classes,
-            shapes,
-        )
-
-    def _align(self, at: Integers, block: Integers, face: Integers) -> None:
-        """Turn and shift the assemblies that move so that the two faces of each event coincide."""
-        cell, quarter, labels = (array[at] for array in self.lattice)
-        row = np.arange(at.size)
-        stays, moves = block.T
-        outward = (face[:, 0] + quarter[row, stays]) % 4
-        turn = outward + 2 - face[:, 1] - quarter[row, moves]
-        moved = labels == labels[row, moves][:, None]
-        arm = rotate(cell - cell[row, moves][:, None], turn[:, None])
-        there = arm + (cell[row, stays] + np.array(STEPS)[outward])[:, None]
-        self.lattice.cell[at] = np.where(moved[..., None], there, cell)
-        self.lattice.quarter[at] = np.where(moved, (quarter + turn[:, None]) % 4, quarter)
-
-    def _shape_numbers(self, at: Integers, event: int, member: Bools) -> Integers:
-        """Return the numbers of the shapes that the members of each run make up."""
-        cell, far = self.lattice.cell[at], 2 * self.blocks
-        lowest = np.where(member[..., None], cell, cell.max(initial=0) + 1).min(axis=1)
-        place = cell - lowest[:, None]
-        codes = np.where(member, place[..., 0] * far + place[..., 1], far * far)
-        codes.sort(axis=1)
-        twice = (np.diff(codes, axis=1) == 0) & (codes[:, 1:] < far * far)
-        _refuse(twice.any(axis=1), at, event, "puts two blocks into one cell")
-        codes, inverse = np.unique(codes, axis=0, return_inverse=True)
-        numbers = []
-        for row in codes:
-            cells = tuple(divmod(code, far) for code in row[row < far * far].tolist())
-            name = name_of(moved_to_origin(cells), self.chirality)
-            numbers.append(self.shapes.number(name))
-        return np.array(numbers, dtype=np.int64)[inverse.reshape(-1)]
-
-    def _class_numbers(self, at: Integers) -> npt.NDArray[np.int32]:
-        """Return the numbers of the outcome classes of the runs."""
-        present = np.sort(self.shape_of[at], axis=1)
-        worlds, inverse = np.unique(present, axis=0, return_inverse=True)
-        names = list(self.shapes.known)
-        numbers = [
-            self.classes.number(class_name(names[shape] for shape in row[row >= 0].tolist()))
-            for row in worlds
-        ]
-        return np.array(numbers, dtype=np.int32)[inverse.reshape(-1)]
 
 
 def rotate(cell: Integers, turn: Integers) -> Integers:

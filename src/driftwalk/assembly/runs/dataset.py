@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import replay_contacts, replay_events
 from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING, face_table
-from driftwalk.assembly.lattice.many_blocks import ReplayedEvents
+from driftwalk.assembly.lattice.replay import ReplayedEvents
 from driftwalk.assembly.runs.start import glued_cells
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError

@@ -1,4 +1,4 @@
-"""Replay the events of worlds of many blocks, and of discs and rectangles, run after run.
+"""Worlds of squares, discs or rectangles while the events of a run are replayed, run after run.
 
 An event changes two assemblies, and the one that moves is the smaller: all events of a run of n
 blocks together move fewer than n log2(n) of them. Among many blocks large assemblies are called by
@@ -16,8 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, OPENING
-from driftwalk.assembly.lattice.polyomino import Chirality, name_of, put_beside, shape_order
-from driftwalk.assembly.outcomes.outcome_classes import class_name, sort_classes
+from driftwalk.assembly.lattice.polyomino import Chirality, name_of, put_beside
+from driftwalk.assembly.outcomes.outcome_classes import (
+    class_name,
+    listed_classes,
+    listed_shapes,
+)
 from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import (
@@ -56,14 +60,13 @@ class ReplayedEvents(NamedTuple):
     """Kinds of the blocks at the end, (run, block); None where faces have no types."""
 
 
-class Names:
+class _Names:
     """Names by number, in the order in which they came."""
 
     def __init__(self, *names: str) -> None:
         self.known = {name: number for number, name in enumerate(names)}
 
     def number(self, name: str) -> int:
-        """Return the number of a name, the next one of a new name."""
         return self.known.setdefault(name, len(self.known))
 
     def index_into(self, listed: tuple[str, ...]) -> npt.NDArray[np.int32]:
@@ -144,7 +147,7 @@ class SquareWorld:
     def shape(self, body: int) -> str:
         """Return the name of the shape of a body."""
         size = len(self.members[body])
-        if size > MOST_CELLS_NAMED:
+        if size > MOST_CELLS_NAMED and len(self.body) > MOST_NAMED:
             return counted_shape(size, self.joins[body])
         cells = tuple(self.cell[member] for member in self.members[body])
         return name_of(moved_to_origin(cells), self.chirality)
@@ -215,13 +218,14 @@ class DiscWorld(SquareWorld):
         )
 
 
-def replay_many(
+def replay(
     number: Integers,
     block: Integers,
     face: Integers,
-    kind: Integers | None = None,
+    kind: Integers | None,
     *,
     blocks: int,
+    chirality: Chirality | None,
     world_of: Callable[[int], SquareWorld],
 ) -> tuple[ReplayedEvents, tuple[Integers, Integers, Integers]]:
     """Replay the events of runs one by one, return cells, quarters and assemblies after them.
@@ -232,10 +236,12 @@ def replay_many(
         Number of events of each run.
     block, face : ndarray of int, shape (runs, events, 2)
         As in `replay_events`.
-    kind : ndarray of int, shape (runs, events), optional
+    kind : ndarray of int, shape (runs, events), or None
         As in `replay_events`.
     blocks : int
         Blocks of each run.
+    chirality : {"merged", "distinct"} or None
+        As in `replay_events`; None of discs and rectangles.
     world_of : callable
         The world of a run at its start.
 
@@ -247,57 +253,58 @@ def replay_many(
     runs, slots = block.shape[:2]
     cell = np.zeros((runs, blocks, 2), dtype=np.int64)
     quarter, assembly = (np.zeros((runs, blocks), dtype=np.int64) for _ in range(2))
-    shapes, classes = Names("1"), Names(all_single(blocks))
-    event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)
-    event_shape = np.full((runs, slots, 3), -1, dtype=np.int32)
-    event_class = np.full((runs, slots), -1, dtype=np.int32)
-    outcome = np.zeros(runs, dtype=np.int32)
-    kinds = np.zeros((runs, slots), dtype=np.int64) if kind is None else kind
+    shapes, classes = _Names("1"), _Names(all_single(blocks))
+    kinds = np.full((runs, slots), JOINING) if kind is None else kind
+    outcome = np.zeros(runs, dtype=np.int64)
+    # Of each event its place, two assemblies, three shapes and the class after it.
+    rows: list[tuple[int, ...]] = []
     for run in range(runs):
-        world = world_of(run)
+        world, now = world_of(run), 0
         shape_of = ["1"] * blocks
-        last, told = number[run], kinds[run].tolist()
-        for event in range(last):
-            of, by = block[run, event].tolist(), face[run, event].tolist()
-            lowest = [world.lowest[world.body[one]] for one in of]
-            if told[event] in (OPENING, CLOSING):
-                world.bond(of, whole=told[event] == CLOSING)
-                event_assembly[run, event] = lowest
-                event_class[run, event] = outcome[run]
+        pairs, faces, told = block[run].tolist(), face[run].tolist(), kinds[run].tolist()
+        for event in range(int(number[run])):
+            pair, what = pairs[event], told[event]
+            lowest = [world.lowest[world.body[one]] for one in pair]
+            if what in (OPENING, CLOSING):
+                world.bond(pair, whole=what == CLOSING)
+                rows.append((run, event, *lowest, -1, -1, -1, now))
                 continue
             try:
-                if told[event] == JOINING:
-                    parts = [shape_of[world.body[one]] for one in of]
-                    _touch_all(world, block[run], told, event, last)
-                    stays, moves = world.join(of, by)
-                    world.bond(of, whole=True)
+                if what == JOINING:
+                    parts = [shape_of[world.body[one]] for one in pair]
+                    _touch_all(world, pairs, told, event, int(number[run]))
+                    stays, moves = world.join(pair, faces[event])
+                    world.bond(pair, whole=True)
                     became = shape_of[stays] = world.shape(stays)
                     shape_of[moves] = ""
                 else:
-                    became = shape_of[world.body[of[0]]]
-                    two = world.part(of)
+                    became = shape_of[world.body[pair[0]]]
+                    two = world.part(pair)
                     lowest = [world.lowest[body] for body in two]
                     parts = [world.shape(body) for body in two]
                     shape_of[two[0]], shape_of[two[1]] = parts
             except InputError as error:
                 raise InputError(f"run {run}, event {event}: {error}") from None
-            event_assembly[run, event] = lowest
-            event_shape[run, event] = [shapes.number(one) for one in (*parts, became)]
             there = [name for name in shape_of if name]
             named = blocks <= MOST_NAMED
             name = _class_of(tuple(sorted(there))) if named else counted_class(len(there))
-            outcome[run] = event_class[run, event] = classes.number(name)
-        cell[run], quarter[run] = world.cell, world.quarter
+            now = classes.number(name)
+            rows.append((run, event, *lowest, *map(shapes.number, (*parts, became)), now))
+        cell[run], quarter[run], outcome[run] = world.cell, world.quarter, now
         assembly[run] = [world.lowest[body] for body in world.body]
-    listed = tuple(sorted(shapes.known, key=shape_order)), sort_classes(classes.known)
-    shape_index, class_index = shapes.index_into(listed[0]), classes.index_into(listed[1])
+    table = np.full((runs, slots, 6), -1)
+    filled = np.array(rows, dtype=np.int64).reshape(-1, 8)
+    table[filled[:, 0], filled[:, 1]] = filled[:, 2:]
+    shape_names = listed_shapes(shapes.known, blocks, chirality=chirality)
+    class_names = listed_classes(classes.known, blocks, chirality=chirality)
+    class_index = classes.index_into(class_names)
     found = ReplayedEvents(
-        event_assembly,
-        shape_index[event_shape],
-        class_index[event_class],
+        table[..., :2].astype(np.int32),
+        shapes.index_into(shape_names)[table[..., 2:5]],
+        class_index[table[..., 5]],
         class_index[outcome],
-        listed[1],
-        listed[0],
+        class_names,
+        shape_names,
     )
     return found, (cell, quarter, assembly)
 
@@ -307,11 +314,11 @@ _class_of = lru_cache(maxsize=1 << 14)(class_name)
 
 
 def _touch_all(
-    world: SquareWorld, block: Integers, kinds: list[int], event: int, last: int
+    world: SquareWorld, pairs: list[list[int]], kinds: list[int], event: int, last: int
 ) -> None:
     """Note what touches by a joining: its two blocks, and contacts that come right after it."""
-    world.touch(block[event].tolist())
+    world.touch(pairs[event])
     event += 1
     while event < last and kinds[event] == CLOSING:
-        world.touch(block[event].tolist())
+        world.touch(pairs[event])
         event += 1
