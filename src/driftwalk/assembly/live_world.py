@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.lattice.join_history import LatticeWorld
-from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, PARTING, BondGraph, face_table
+from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, PARTING, face_table
+from driftwalk.assembly.lattice.replay import DiscWorld, SquareWorld
 from driftwalk.assembly.outcomes.outcome_classes import state_class
 from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of
@@ -425,25 +425,24 @@ class LiveTank:
         """Take time steps, fewer where there are too many events, and note these."""
         study = self._active.study
         state = self._world.state()
-        lattice = LatticeWorld.of(state)
-        bonds = BondGraph(1, lattice.blocks)
-        bonds.put(np.zeros(len(state["bond"]), dtype=np.int64), state["bond"], True)
+        blocks, chirality = len(state["assembly"]), study.assembly.chirality
+        world = SquareWorld(blocks, chirality) if self.has_lattice else DiscWorld(blocks)
+        world.begin(state)
         found = self._world.advance(steps)
         pose = self._world.state()["pose"]
         times = times_of(found["step"], time_step=study.time_step_s).tolist()
         kinds, pairs, faces = (found[name].tolist() for name in ("kind", "block", "face"))
         for time, kind, pair, joined in zip(times, kinds, pairs, faces, strict=True):
-            blocks = (pair[0], pair[1])
-            bonds.put(np.zeros(1, dtype=np.int64), np.array([pair]), kind in (JOINING, CLOSING))
-            if kind == JOINING and self.has_lattice:
-                lattice.join(blocks, (joined[0], joined[1]))
-            elif kind == JOINING:
-                lattice.partition.unite(blocks)
-            elif kind == PARTING:
-                side = bonds.reached(np.zeros(1, dtype=np.int64), np.array(pair[:1]))[0]
-                lattice.partition.cut(np.flatnonzero(side).tolist())
+            if kind == PARTING:
+                world.part(pair)
             else:
+                world.bond(pair, whole=kind in (JOINING, CLOSING))
+            if kind == JOINING:
+                world.join(pair, joined)
+            elif kind != PARTING:
                 continue
-            now = np.array(lattice.cell), np.array(lattice.partition.labels)
-            outcome = state_class({"pose": pose, "cell": now[0], "assembly": now[1]}, study)
-            self._events.append(LiveEvent(time, blocks, outcome, is_parting=kind == PARTING))
+            now = {"pose": pose, "cell": np.array(world.cell), "assembly": np.array(world.body)}
+            outcome = state_class(now, study)
+            self._events.append(
+                LiveEvent(time, (pair[0], pair[1]), outcome, is_parting=kind == PARTING)
+            )

@@ -479,15 +479,12 @@ def stored_modes(policy: xr.Dataset) -> Modes:
     policy : xarray.Dataset
         A `control_policy`.
     """
-    import xarray as xr
-
     from driftwalk.model import parse_study
 
     about = {"kind": "flow_field", "schema_version": 1, "arena": policy.attrs["arena"]}
-    fields = (
-        xr.Dataset(policy[["u", "v", "flag"]].isel(field=at), attrs=about)
-        for at in range(policy.sizes["field"])
-    )
+    fields = [policy[["u", "v", "flag"]].isel(field=at) for at in range(policy.sizes["field"])]
+    for field in fields:
+        field.attrs = dict(about)
     return Modes(
         parse_study(policy.attrs["study"], source="the policy's study"),
         tuple(fields),

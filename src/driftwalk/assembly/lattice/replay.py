@@ -8,9 +8,9 @@ the same shape.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -107,6 +107,18 @@ class SquareWorld:
         for one, other in (block, block[::-1]):
             (self.bonded[one].add if whole else self.bonded[one].discard)(other)
 
+    def begin(self, state: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Begin with the assemblies and bonds of a world of the native core."""
+        self.cell = [(x, y) for x, y in state["cell"].tolist()]
+        self.quarter = state["quarter"].tolist()
+        self.body = state["assembly"].tolist()
+        self.members = [[] for _ in self.body]
+        for block, body in enumerate(self.body):
+            self.members[body].append(block)
+        self.taken = [{self.cell[one] for one in members} for members in self.members]
+        for pair in state["bond"].tolist():
+            self.bond(pair, whole=True)
+
     def touch(self, block: list[int]) -> None:
         """Note that two blocks touch; of squares the lattice tells it."""
 
@@ -176,13 +188,14 @@ class DiscWorld(SquareWorld):
     All contacts at the end were there all along; without pairs they come from the events.
     """
 
-    def __init__(self, blocks: int, pairs: list[tuple[int, int]], *, noun: str) -> None:
+    def __init__(
+        self, blocks: int, pairs: list[tuple[int, int]] | None = None, *, noun: str = "discs"
+    ) -> None:
         super().__init__(blocks, "merged")
         self.noun = noun
         self.near: list[list[int]] = [[] for _ in range(blocks)]
-        for one, other in pairs:
-            self.near[one].append(other)
-            self.near[other].append(one)
+        for pair in pairs or ():
+            self.touch(list(pair))
 
     def shape(self, body: int) -> str:
         """Return the name of the contact graph of a body."""
