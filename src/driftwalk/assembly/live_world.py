@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, PARTING, face_table
-from driftwalk.assembly.lattice.replay import DiscWorld, SquareWorld
+from driftwalk.assembly.lattice.replayed_worlds import DiscWorld, SquareWorld
 from driftwalk.assembly.outcomes.outcome_classes import state_class
 from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of

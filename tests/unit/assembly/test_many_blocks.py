@@ -12,7 +12,7 @@ from single_block import SIDE, model, swirl
 
 import driftwalk as dw
 from driftwalk.assembly import assembly_sizes, replay_events
-from driftwalk.assembly.lattice import replay as module
+from driftwalk.assembly.lattice import events, replayed_worlds
 from driftwalk.assembly.lattice.events import replay_contacts
 from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.outcome_classes import sort_classes, world_class
@@ -34,7 +34,8 @@ def test_what_is_counted_is_as_what_is_named(monkeypatch: pytest.MonkeyPatch) ->
     """Shapes of the same size and perimeter, as many assemblies."""
     raw = events_of()
     names = replay_events(**raw)
-    monkeypatch.setattr(module, "MOST_NAMED", BLOCKS - 1)
+    for module in (events, replayed_worlds):
+        monkeypatch.setattr(module, "MOST_NAMED", BLOCKS - 1)
     counted = replay_events(**raw)
     np.testing.assert_array_equal(counted.event_assembly, names.event_assembly)
     assert any(counts_of_shape(name)[0] > 8 for name in counted.shapes)
@@ -91,7 +92,8 @@ def test_a_recording_of_many_blocks_is_classified() -> None:
 
 
 def test_what_cannot_be_names_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_NAMED", BLOCKS - 1)
+    for module in (events, replayed_worlds):
+        monkeypatch.setattr(module, "MOST_NAMED", BLOCKS - 1)
     raw = events_of()
     twice = {name: values.copy() for name, values in raw.items()}
     twice["event_block"][2, 1] = twice["event_block"][2, 0]

@@ -7,17 +7,45 @@ follows: which assemblies they were, what shapes these had, and the outcome clas
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, FaceTable
+from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, OPENING, FaceTable
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
-from driftwalk.assembly.lattice.replay import DiscWorld, ReplayedEvents, SquareWorld, replay
-from driftwalk.assembly.outcomes.outcome_classes import contact_pairs
+from driftwalk.assembly.lattice.replayed_worlds import DiscWorld, SquareWorld
+from driftwalk.assembly.outcomes.outcome_classes import (
+    class_name,
+    contact_pairs,
+    listed_classes,
+    listed_shapes,
+)
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
+from driftwalk.schema.shapes import MOST_NAMED, all_single, counted_class
+
+
+class ReplayedEvents(NamedTuple):
+    """Results of the events of some runs; -1 where a run had no such event."""
+
+    event_assembly: npt.NDArray[np.int32]
+    """Lowest block of the assembly that stayed and of the one that moved, (run, event, side); of a
+    parting of the two parts."""
+    event_shape: npt.NDArray[np.int32]
+    """Shapes of the two and of what they became, (run, event, part): indices into `shapes`. Of a
+    parting those of the two parts and of what they were; -1 where only a bond of a loop changed."""
+    event_class: npt.NDArray[np.int32]
+    """Outcome class of the world after the event, (run, event): an index into `classes`."""
+    outcome: npt.NDArray[np.int32]
+    """Outcome class at the end, (run,): an index into `classes`."""
+    classes: tuple[str, ...]
+    """Names of the classes: all for up to 8 blocks, beyond that those that occurred."""
+    shapes: tuple[str, ...]
+    """Names of the shapes, by the same rule."""
+    kind: Integers | None = None
+    """Kinds of the blocks at the end, (run, block); None where faces have no types."""
 
 
 def replay_events(
@@ -143,10 +171,80 @@ def _replayed(
     chirality: Chirality | None,
     world_of: Callable[[int], SquareWorld],
 ) -> ReplayedEvents:
+    """Return what the events did, run after run; each begins in its own world."""
+    runs, slots = events.block.shape[:2]
     blocks = end.assembly.shape[1]
-    found, state = replay(*events, blocks=blocks, chirality=chirality, world_of=world_of)
-    _check_end(_Lattice(*state), end)
-    return found
+    cell = np.zeros((runs, blocks, 2), dtype=np.int64)
+    quarter, assembly = (np.zeros((runs, blocks), dtype=np.int64) for _ in range(2))
+    shapes, classes = _Names("1"), _Names(all_single(blocks))
+    kinds = np.full((runs, slots), JOINING) if events.kind is None else events.kind
+    outcome = np.zeros(runs, dtype=np.int64)
+    # Of each event its place, two assemblies, three shapes and the class after it.
+    rows: list[tuple[int, ...]] = []
+    for run in range(runs):
+        world, now = world_of(run), 0
+        shape_of = ["1"] * blocks
+        pairs, faces, told = (one[run].tolist() for one in (events.block, events.face, kinds))
+        for event in range(int(events.number[run])):
+            pair, what = pairs[event], told[event]
+            lowest = [world.lowest[world.body[one]] for one in pair]
+            if what in (OPENING, CLOSING):
+                world.bond(pair, whole=what == CLOSING)
+                rows.append((run, event, *lowest, -1, -1, -1, now))
+                continue
+            try:
+                if what == JOINING:
+                    parts = [shape_of[world.body[one]] for one in pair]
+                    _touch_all(world, pairs, told, event, int(events.number[run]))
+                    stays, moves = world.join(pair, faces[event])
+                    world.bond(pair, whole=True)
+                    became = shape_of[stays] = world.shape(stays)
+                    shape_of[moves] = ""
+                else:
+                    became = shape_of[world.body[pair[0]]]
+                    two = world.part(pair)
+                    lowest = [world.lowest[body] for body in two]
+                    parts = [world.shape(body) for body in two]
+                    shape_of[two[0]], shape_of[two[1]] = parts
+            except InputError as error:
+                raise InputError(f"run {run}, event {event}: {error}") from None
+            there = [name for name in shape_of if name]
+            named = blocks <= MOST_NAMED
+            name = _class_of(tuple(sorted(there))) if named else counted_class(len(there))
+            now = classes.number(name)
+            rows.append((run, event, *lowest, *map(shapes.number, (*parts, became)), now))
+        cell[run], quarter[run], outcome[run] = world.cell, world.quarter, now
+        assembly[run] = [world.lowest[body] for body in world.body]
+    table = np.full((runs, slots, 6), -1)
+    filled = np.array(rows, dtype=np.int64).reshape(-1, 8)
+    table[filled[:, 0], filled[:, 1]] = filled[:, 2:]
+    shape_names = listed_shapes(shapes.known, blocks, chirality=chirality)
+    class_names = listed_classes(classes.known, blocks, chirality=chirality)
+    class_index = classes.index_into(class_names)
+    _check_end(_Lattice(cell, quarter, assembly), end)
+    return ReplayedEvents(
+        table[..., :2].astype(np.int32),
+        shapes.index_into(shape_names)[table[..., 2:5]],
+        class_index[table[..., 5]],
+        class_index[outcome],
+        class_names,
+        shape_names,
+    )
+
+
+# Many runs meet in the same worlds.
+_class_of = lru_cache(maxsize=1 << 14)(class_name)
+
+
+def _touch_all(
+    world: SquareWorld, pairs: list[list[int]], kinds: list[int], event: int, last: int
+) -> None:
+    """Note what touches by a joining: its two blocks, and contacts that come right after it."""
+    world.touch(pairs[event])
+    event += 1
+    while event < last and kinds[event] == CLOSING:
+        world.touch(pairs[event])
+        event += 1
 
 
 def _follow_kinds(events: _Events, faces: FaceTable, shape: tuple[int, ...]) -> Integers:
@@ -163,6 +261,21 @@ def _follow_kinds(events: _Events, faces: FaceTable, shape: tuple[int, ...]) -> 
     return kind
 
 
+class _Names:
+    """Names by number, in the order in which they came."""
+
+    def __init__(self, *names: str) -> None:
+        self.known = {name: number for number, name in enumerate(names)}
+
+    def number(self, name: str) -> int:
+        return self.known.setdefault(name, len(self.known))
+
+    def index_into(self, listed: tuple[str, ...]) -> npt.NDArray[np.int32]:
+        """Return from number to place in a list; at its end -1, so that -1 stays what it is."""
+        place = {name: index for index, name in enumerate(listed)}
+        return np.array([*(place[name] for name in self.known), -1], dtype=np.int32)
+
+
 class _Events(NamedTuple):
     number: Integers
     block: Integers
@@ -176,13 +289,6 @@ class _Lattice(NamedTuple):
     cell: Integers
     quarter: Integers
     assembly: Integers
-
-
-def rotate(cell: Integers, turn: Integers) -> Integers:
-    """Turn cells (..., 2) by quarters (...) about the origin."""
-    x, y = cell[..., 0], cell[..., 1]
-    turns = [(x, y), (-y, x), (-x, -y), (y, -x)]
-    return np.stack([np.choose(turn % 4, [pair[axis] for pair in turns]) for axis in (0, 1)], -1)
 
 
 def _whole(values: npt.ArrayLike) -> Integers:
@@ -225,18 +331,20 @@ def _check_end(replayed: _Lattice, end: _Lattice) -> None:
     differs = replayed.assembly != end.assembly
     if not differs.any():
         (cell, quarter), (end_cell, end_quarter) = _from_lowest(replayed), _from_lowest(end)
-        differs = (cell != end_cell).any(axis=2) | (quarter != end_quarter)
+        differs = (cell != end_cell) | (quarter != end_quarter)
     if differs.any():
         run, block = map(int, np.argwhere(differs)[0])
         raise InputError(f"run {run}: the events do not lead block {block} to where it is")
 
 
-def _from_lowest(lattice: _Lattice) -> tuple[Integers, Integers]:
-    """Return cells and quarters as seen from the lowest block of each assembly."""
-    lowest = lattice.assembly
-    origin = np.take_along_axis(lattice.cell, lowest[..., None], axis=1)
-    turned = np.take_along_axis(lattice.quarter, lowest, axis=1)
-    return rotate(lattice.cell - origin, -turned), (lattice.quarter - turned) % 4
+def _from_lowest(lattice: _Lattice) -> tuple[npt.NDArray[np.complex128], Integers]:
+    """Return cells, as x + iy, and quarters as seen from the lowest block of each assembly."""
+    cell = lattice.cell[..., 0] + 1j * lattice.cell[..., 1]
+    origin, turned = (
+        np.take_along_axis(one, lattice.assembly, axis=1) for one in (cell, lattice.quarter)
+    )
+    back = np.array([1, -1j, -1, 1j])[turned % 4]
+    return (cell - origin) * back, (lattice.quarter - turned) % 4
 
 
 def _refuse(wrong: Bools, at: Integers, event: int, what: str) -> None:

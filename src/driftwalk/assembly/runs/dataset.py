@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.events import replay_contacts, replay_events
+from driftwalk.assembly.lattice.events import ReplayedEvents, replay_contacts, replay_events
 from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING, face_table
-from driftwalk.assembly.lattice.replay import ReplayedEvents
 from driftwalk.assembly.runs.start import glued_cells
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError

@@ -8,71 +8,24 @@ the same shape.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import lru_cache
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, OPENING
 from driftwalk.assembly.lattice.polyomino import Chirality, name_of, put_beside
-from driftwalk.assembly.outcomes.outcome_classes import (
-    class_name,
-    listed_classes,
-    listed_shapes,
-)
-from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import (
     MOST_CELLS_NAMED,
     MOST_DISCS,
     MOST_NAMED,
     STEPS,
-    all_single,
-    counted_class,
     counted_graph,
     counted_shape,
     graph_name,
     joins_of_cells,
     moved_to_origin,
 )
-
-
-class ReplayedEvents(NamedTuple):
-    """Results of the events of some runs; -1 where a run had no such event."""
-
-    event_assembly: npt.NDArray[np.int32]
-    """Lowest block of the assembly that stayed and of the one that moved, (run, event, side); of a
-    parting of the two parts."""
-    event_shape: npt.NDArray[np.int32]
-    """Shapes of the two and of what they became, (run, event, part): indices into `shapes`. Of a
-    parting those of the two parts and of what they were; -1 where only a bond of a loop changed."""
-    event_class: npt.NDArray[np.int32]
-    """Outcome class of the world after the event, (run, event): an index into `classes`."""
-    outcome: npt.NDArray[np.int32]
-    """Outcome class at the end, (run,): an index into `classes`."""
-    classes: tuple[str, ...]
-    """Names of the classes: all for up to 8 blocks, beyond that those that occurred."""
-    shapes: tuple[str, ...]
-    """Names of the shapes, by the same rule."""
-    kind: Integers | None = None
-    """Kinds of the blocks at the end, (run, block); None where faces have no types."""
-
-
-class _Names:
-    """Names by number, in the order in which they came."""
-
-    def __init__(self, *names: str) -> None:
-        self.known = {name: number for number, name in enumerate(names)}
-
-    def number(self, name: str) -> int:
-        return self.known.setdefault(name, len(self.known))
-
-    def index_into(self, listed: tuple[str, ...]) -> npt.NDArray[np.int32]:
-        """Return from number to place in a list; at its end -1, so that -1 stays what it is."""
-        place = {name: index for index, name in enumerate(listed)}
-        return np.array([*(place[name] for name in self.known), -1], dtype=np.int32)
 
 
 class SquareWorld:
@@ -229,109 +182,3 @@ class DiscWorld(SquareWorld):
             for member in self.members[moves]
             for other in self.near[member]
         )
-
-
-def replay(
-    number: Integers,
-    block: Integers,
-    face: Integers,
-    kind: Integers | None,
-    *,
-    blocks: int,
-    chirality: Chirality | None,
-    world_of: Callable[[int], SquareWorld],
-) -> tuple[ReplayedEvents, tuple[Integers, Integers, Integers]]:
-    """Replay the events of runs one by one, return cells, quarters and assemblies after them.
-
-    Parameters
-    ----------
-    number : ndarray of int, shape (runs,)
-        Number of events of each run.
-    block, face : ndarray of int, shape (runs, events, 2)
-        As in `replay_events`.
-    kind : ndarray of int, shape (runs, events), or None
-        As in `replay_events`.
-    blocks : int
-        Blocks of each run.
-    chirality : {"merged", "distinct"} or None
-        As in `replay_events`; None of discs and rectangles.
-    world_of : callable
-        The world of a run at its start.
-
-    Raises
-    ------
-    InputError
-        When an event cannot be; names the run.
-    """
-    runs, slots = block.shape[:2]
-    cell = np.zeros((runs, blocks, 2), dtype=np.int64)
-    quarter, assembly = (np.zeros((runs, blocks), dtype=np.int64) for _ in range(2))
-    shapes, classes = _Names("1"), _Names(all_single(blocks))
-    kinds = np.full((runs, slots), JOINING) if kind is None else kind
-    outcome = np.zeros(runs, dtype=np.int64)
-    # Of each event its place, two assemblies, three shapes and the class after it.
-    rows: list[tuple[int, ...]] = []
-    for run in range(runs):
-        world, now = world_of(run), 0
-        shape_of = ["1"] * blocks
-        pairs, faces, told = block[run].tolist(), face[run].tolist(), kinds[run].tolist()
-        for event in range(int(number[run])):
-            pair, what = pairs[event], told[event]
-            lowest = [world.lowest[world.body[one]] for one in pair]
-            if what in (OPENING, CLOSING):
-                world.bond(pair, whole=what == CLOSING)
-                rows.append((run, event, *lowest, -1, -1, -1, now))
-                continue
-            try:
-                if what == JOINING:
-                    parts = [shape_of[world.body[one]] for one in pair]
-                    _touch_all(world, pairs, told, event, int(number[run]))
-                    stays, moves = world.join(pair, faces[event])
-                    world.bond(pair, whole=True)
-                    became = shape_of[stays] = world.shape(stays)
-                    shape_of[moves] = ""
-                else:
-                    became = shape_of[world.body[pair[0]]]
-                    two = world.part(pair)
-                    lowest = [world.lowest[body] for body in two]
-                    parts = [world.shape(body) for body in two]
-                    shape_of[two[0]], shape_of[two[1]] = parts
-            except InputError as error:
-                raise InputError(f"run {run}, event {event}: {error}") from None
-            there = [name for name in shape_of if name]
-            named = blocks <= MOST_NAMED
-            name = _class_of(tuple(sorted(there))) if named else counted_class(len(there))
-            now = classes.number(name)
-            rows.append((run, event, *lowest, *map(shapes.number, (*parts, became)), now))
-        cell[run], quarter[run], outcome[run] = world.cell, world.quarter, now
-        assembly[run] = [world.lowest[body] for body in world.body]
-    table = np.full((runs, slots, 6), -1)
-    filled = np.array(rows, dtype=np.int64).reshape(-1, 8)
-    table[filled[:, 0], filled[:, 1]] = filled[:, 2:]
-    shape_names = listed_shapes(shapes.known, blocks, chirality=chirality)
-    class_names = listed_classes(classes.known, blocks, chirality=chirality)
-    class_index = classes.index_into(class_names)
-    found = ReplayedEvents(
-        table[..., :2].astype(np.int32),
-        shapes.index_into(shape_names)[table[..., 2:5]],
-        class_index[table[..., 5]],
-        class_index[outcome],
-        class_names,
-        shape_names,
-    )
-    return found, (cell, quarter, assembly)
-
-
-# Many runs meet in the same worlds.
-_class_of = lru_cache(maxsize=1 << 14)(class_name)
-
-
-def _touch_all(
-    world: SquareWorld, pairs: list[list[int]], kinds: list[int], event: int, last: int
-) -> None:
-    """Note what touches by a joining: its two blocks, and contacts that come right after it."""
-    world.touch(pairs[event])
-    event += 1
-    while event < last and kinds[event] == CLOSING:
-        world.touch(pairs[event])
-        event += 1
