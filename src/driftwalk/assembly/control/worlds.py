@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.assembly.control.decision_process import Decisions, age_bin, phase_of
 from driftwalk.assembly.control.modes import Modes
@@ -69,7 +70,7 @@ class Controller:
         """Whether the last decision of each world was open: a class was seen, no dwell held it."""
 
     def decide(
-        self, seen: Integers, age: Integers, *, left: int, wish: Integers | None = None
+        self, seen: Integers, age: Integers, *, left: int, wish: npt.ArrayLike = -1
     ) -> Integers:
         """Return the modes for the next period.
 
@@ -84,7 +85,7 @@ class Controller:
             Whole periods since they were entered.
         left : int
             Decisions that are left, this one too; from 1.
-        wish : ndarray of int, shape (worlds,), optional
+        wish : array_like of int, shape (worlds,), optional
             Modes in place of the policy's, where not negative.
 
         Returns
@@ -92,12 +93,10 @@ class Controller:
         ndarray of int, shape (worlds,)
             The modes.
         """
-        action = self._rules.action[:, phase_of(left)]
+        action, wished = self._rules.action[:, phase_of(left)], np.asarray(wish) >= 0
         wanted = action[self._policy, np.maximum(seen, 0), age_bin(age)]
-        if wish is not None:
-            wanted = np.where(wish >= 0, wish, wanted)
-        looked = seen != UNKNOWN if wish is None else (seen != UNKNOWN) | (wish >= 0)
-        self.free = looked & (self._held >= self._rules.dwell)
+        wanted = np.where(wished, wish, wanted)
+        self.free = ((seen != UNKNOWN) | wished) & (self._held >= self._rules.dwell)
         changed = self.free & (wanted != self.mode)
         self.mode = np.where(changed, wanted, self.mode)
         self._held = np.where(changed, 1, self._held + 1)

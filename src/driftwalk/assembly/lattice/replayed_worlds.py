@@ -88,15 +88,13 @@ class SquareWorld:
         bodies = []
         for part in (sorted(side), sorted(set(self.members[was]) - side)):
             body = was if was in part else part[0]
-            self.lowest[body] = part[0]
-            bodies.append((body, part))
-        for body, part in bodies:
-            self.members[body] = part
+            bodies.append(body)
+            self.lowest[body], self.members[body] = part[0], part
             self.taken[body] = {self.cell[member] for member in part}
             for member in part:
                 self.body[member] = body
             self.joins[body] = self._joins_within(body)
-        return bodies[0][0], bodies[1][0]
+        return bodies[0], bodies[1]
 
     def _reached(self, block: int) -> set[int]:
         found, ahead = {block}, [block]

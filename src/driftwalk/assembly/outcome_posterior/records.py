@@ -136,7 +136,7 @@ def records_of_events(
 
 def records_to_text(records: Sequence[Record]) -> str:
     """Return records as text."""
-    return json.dumps([[*one[:1], one.completion, one.joins, one.early] for one in records])
+    return json.dumps(records)
 
 
 def records_from_text(text: str) -> list[Record]:

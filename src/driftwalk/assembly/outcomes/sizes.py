@@ -15,7 +15,7 @@ from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
 from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.distribution import (
     at_times,
-    copied_attrs,
+    attrs_of_runs,
     duration,
     require_assembly,
     runs_with_outcome,
@@ -136,12 +136,9 @@ def assembly_sizes(
         data,
         {"size": ("size", first), "size_to": ("size", last), "time": ("time", time)},
         {
-            **copied_attrs(assembly),
+            **attrs_of_runs(assembly, sound, confidence),
             **attrs,
             "compactness_runs": int(np.isfinite(at_end).sum()),
-            "runs": int(sound.sum()),
-            "left_out": int((~sound).sum()),
-            "confidence": confidence,
             "method": METHOD,
         },
     )

@@ -13,8 +13,8 @@ import numpy as np
 from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
 from driftwalk.assembly.outcomes.bond_kinetics import PARTS, clustering, rate_variables
 from driftwalk.assembly.outcomes.distribution import (
+    attrs_of_runs,
     class_names,
-    copied_attrs,
     duration,
     require_assembly,
     runs_with_outcome,
@@ -124,10 +124,7 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
         data | curves,
         {"class": ("class", np.array(names, dtype=object)), "age": ("age", age)},
         {
-            **copied_attrs(assembly),
-            "runs": runs,
-            "left_out": int((~sound).sum()),
-            "confidence": confidence,
+            **attrs_of_runs(assembly, sound, confidence),
             "method": METHOD,
             "from_s": begin,
             "steady_p": p,

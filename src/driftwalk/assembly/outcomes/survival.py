@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.outcomes.distribution import (
+    attrs_of_runs,
     check_times,
     class_names,
     duration,
@@ -117,7 +118,7 @@ def class_times(
     )
     limits = proportion_interval(count, runs, confidence=confidence)
     data = with_limits("proportion", ("time", "class"), count / runs, *limits)
-    attrs: dict[str, Any] = {}
+    attrs = attrs_of_runs(assembly, sound, confidence)
     end_time = assembly["end_time"].values[sound]
     for event in EVENTS:
         curve = survival_curve(
@@ -130,13 +131,7 @@ def class_times(
         "class_times",
         data,
         {"time": ("time", time), "class": ("class", np.array(names, dtype=object))},
-        {
-            **assembly.attrs,
-            **attrs,
-            "runs": runs,
-            "left_out": int((~sound).sum()),
-            "confidence": confidence,
-        },
+        attrs,
     )
 
 

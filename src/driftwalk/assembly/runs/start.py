@@ -93,16 +93,13 @@ def with_glue_events(found: Arrays, cells: npt.NDArray[np.int32] | None, blocks:
         return found
     order = [(int(x), int(y)) for x, y in cells]
     joins = [(*parent, k) for k in range(1, len(order)) if (parent := _parent(order[:k], order[k]))]
-    ends = [
-        (first + parent, first + block, face)
-        for first in range(0, blocks, len(order))
-        for parent, face, block in joins
-    ]
-    block = np.array([[parent, child] for parent, child, _ in ends])
-    face = np.array([[one, (one + 2) % 4] for *_, one in ends])
-    before = {"event_step": np.zeros(len(ends)), "event_block": block, "event_face": face}
+    parent, side, child = np.array(joins).T
+    first = np.arange(0, blocks, len(order))[:, None, None]
+    block = (first + np.column_stack([parent, child])).reshape(-1, 2)
+    face = np.tile(np.column_stack([side, (side + 2) % 4]), (len(first), 1))
+    before = {"event_step": np.zeros(len(block)), "event_block": block, "event_face": face}
     runs, rows = found["event_step"].shape
-    made = {"event_count": found["event_count"] + np.int32(len(ends))}
+    made = {"event_count": found["event_count"] + np.int32(len(block))}
     for name, values in before.items():
         whole = np.broadcast_to(values.astype(np.int32), (runs, *values.shape))
         made[name] = np.concatenate([whole, found[name]], axis=1)[:, :rows]
