@@ -14,6 +14,9 @@ from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import Purpose
 from driftwalk.model import Study, Tank
+from driftwalk.model.simulation import Pose
+from driftwalk.model.study import block_corners
+from driftwalk.model.tank import edges, inward_distance
 
 Fits = Callable[[float, float, float], bool]
 """Whether there is room for a pose x, y [m], theta [rad]."""
@@ -46,9 +49,6 @@ def random_start(study: Study, keys: Keys) -> Start:
     InputError
         When no pose that fits was found in 1000 draws.
     """
-    from driftwalk.model.simulation import Pose
-    from driftwalk.model.study import block_corners
-
     tank, block = study.tank, study.block
 
     def fits(x: float, y: float, theta: float) -> bool:
@@ -68,8 +68,6 @@ def random_place(tank: Tank, keys: Keys, *, clearance: float = 0.0) -> Start:
     InputError
         When no place so far from the wall was found in 1000 draws.
     """
-    from driftwalk.model.tank import edges, inward_distance
-
     sides = edges(tank.corners_m) if tank.radius_m is None else ()
 
     def fits(x: float, y: float, _: float) -> bool:

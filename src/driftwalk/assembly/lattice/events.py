@@ -195,7 +195,8 @@ def _replayed(
             try:
                 if what == JOINING:
                     parts = [shape_of[world.body[one]] for one in pair]
-                    _touch_all(world, pairs, told, event, int(events.number[run]))
+                    if events.kind is not None:
+                        _touch_all(world, pairs, told, event, int(events.number[run]))
                     stays, moves = world.join(pair, faces[event])
                     world.bond(pair, whole=True)
                     became = shape_of[stays] = world.shape(stays)

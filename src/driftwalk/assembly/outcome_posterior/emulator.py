@@ -69,16 +69,14 @@ class Emulator(NamedTuple):
 
         filled = count + EMULATOR_POLICY.pseudo_count
         said, noise = digamma(filled), polygamma(1, filled)
-        length, variance, factor, solved = [], [], [], []
+        rows = []
         for k in range(count.shape[1]):
             scales = _fitted_scales(node, said[:, k], noise[:, k])
             covariance = _kernel(node, node, scales) + np.diag(noise[:, k])
             root = np.linalg.cholesky(covariance)
-            length.append(np.exp(scales[1:]))
-            variance.append(np.exp(scales[0]))
-            factor.append(root)
-            solved.append(cho_solve((root, True), said[:, k]))
-        return cls(node, *map(np.array, (length, variance, factor, solved)))
+            solved = cho_solve((root, True), said[:, k])
+            rows.append((np.exp(scales[1:]), np.exp(scales[0]), root, solved))
+        return cls(node, *map(np.array, zip(*rows, strict=True)))
 
     def predict(self, point: Floats) -> tuple[Floats, Floats]:
         """Return mean and variance of the logarithms at points, shape (point, category) each."""
