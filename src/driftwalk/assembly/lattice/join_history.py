@@ -9,8 +9,8 @@ import numpy as np
 
 from driftwalk.assembly.lattice.joined_faces import Join
 from driftwalk.assembly.lattice.polyomino import Chirality, name_of, put_beside
-from driftwalk.assembly.outcomes.outcome_classes import class_name
-from driftwalk.schema.shapes import MOST_NAMED, Cell, counted_class, moved_to_origin
+from driftwalk.assembly.outcomes.outcome_classes import world_class
+from driftwalk.schema.shapes import Cell, moved_to_origin
 
 
 class Event(NamedTuple):
@@ -167,13 +167,7 @@ class LatticeWorld:
 
     def outcome(self, chirality: Chirality, parts: Partition | None = None) -> str:
         """Name the outcome class of the blocks, parted as they are or as said."""
-        labels = (parts or self.partition).labels
-        if len(labels) > MOST_NAMED:
-            return counted_class(len(set(labels)))
-        members: dict[int, list[int]] = {}
-        for block, label in enumerate(labels):
-            members.setdefault(label, []).append(block)
-        return class_name(self.shape(blocks, chirality) for blocks in members.values())
+        return world_class(self.cell, (parts or self.partition).labels, chirality=chirality)
 
     def join(self, blocks: tuple[int, int], faces: tuple[int, int]) -> bool:
         """Join two faces; False when that contradicts the joins that there are."""
