@@ -36,8 +36,7 @@ from driftwalk.figures import calibration_figures, write_figures
 from driftwalk.motion import BlockModel
 from driftwalk.schema import body_track
 from driftwalk.schema.answers.facts import facts_of
-from driftwalk.simulation.backend import world_table
-from driftwalk.simulation.initial import world_orientations
+from driftwalk.simulation.initial import world_table
 
 TARGET_ALL_S = 30.0
 TARGET_MEMORY_GB = 2.0
@@ -84,10 +83,10 @@ def baseline_seconds(recording: Any, flow: Any, study: Any, threads: int, worlds
     problem = prepare_problem(track, study, flow, camera=camera, threads=threads)
     forces = study.forces
     keys = world_keys(study.calibration.seed, trial=0, replicate=np.arange(BASELINE_WORLDS))
-    start = problem.like.start
     table = world_table(
-        **{**start._asdict(), "theta": world_orientations(start.theta, keys)},
-        drag_coefficient=np.full(BASELINE_WORLDS, forces.drag_coefficient),
+        problem.like.start,
+        keys,
+        drag_coefficient=forces.drag_coefficient,
         force_std=forces.force_std_N,
     )
     model = BlockModel(study).native(problem.like)

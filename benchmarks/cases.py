@@ -23,7 +23,8 @@ from driftwalk import _core
 from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Study
 from driftwalk.schema import build_flow_field
-from driftwalk.simulation.backend import Camera, native_model, world_table
+from driftwalk.simulation.backend import Camera, native_model
+from driftwalk.simulation.initial import Start, world_table
 
 Floats = npt.NDArray[np.float64]
 
@@ -95,14 +96,10 @@ def contact_heavy(*, worlds: int = WORLDS) -> Case:
     )
     place, angle = np.sqrt(rng.uniform(size=worlds)), rng.uniform(-np.pi, np.pi, worlds)
     reach = (RADIUS_M - np.sqrt(0.5) * study.block.side_m) * place
-    table = world_table(
-        x=reach * np.cos(angle),
-        y=reach * np.sin(angle),
-        theta=rng.uniform(-np.pi, np.pi, worlds),
-        drag_coefficient=np.full(worlds, DRAG_COEFFICIENT),
-        force_std=np.full(worlds, FORCE_STD_N),
-    )
+    turned = rng.uniform(-np.pi, np.pi, worlds)
+    start = Start(reach * np.cos(angle), reach * np.sin(angle), turned)
     keys = world_keys(1, trial=0, replicate=np.arange(worlds))
+    table = world_table(start, keys, drag_coefficient=DRAG_COEFFICIENT, force_std=FORCE_STD_N)
     return Case(study, axis, u, v, table, keys)
 
 

@@ -6,8 +6,7 @@ from driftwalk.assembly.control.modes import Modes, ModeSource, make_modes
 from driftwalk.assembly.control.plan import check_control, plan_control
 from driftwalk.assembly.control.trial import control_path, try_control
 from driftwalk.assembly.control.worlds import Wanted
-from driftwalk.assembly.lattice.events import replay_events
-from driftwalk.assembly.lattice.many_blocks import ReplayedEvents
+from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
 from driftwalk.assembly.outcome_posterior.infer import infer_outcomes

@@ -11,21 +11,21 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.lattice.join_history import LatticeWorld
-from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, PARTING, BondGraph, face_table
-from driftwalk.assembly.outcomes.outcome_classes import disc_class
+from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, PARTING, face_table
+from driftwalk.assembly.lattice.replayed_worlds import DiscWorld, SquareWorld
+from driftwalk.assembly.outcomes.outcome_classes import state_class
 from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import make_plan, start_poses, steps_of
 from driftwalk.assembly.runs.start import glued_cells, require_bonds, require_room
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.model import Study, apply_overrides
 from driftwalk.simulation.backend import BROKEN
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
     from driftwalk.model.assembly import HiddenFaceDrag, Latching
 
 
@@ -48,16 +48,12 @@ class _Moment:
     def __init__(self, world: _core.LiveWorld, study: Study) -> None:
         self.state: dict[str, npt.NDArray[Any]] = world.state()
         self.time = float(times_of(np.array(world.step), time_step=study.time_step_s))
-        self._chirality = study.assembly.chirality
         self.table = face_table(study.assembly)
-        self._block = study.block
+        self._study = study
 
     @cached_property
     def outcome(self) -> str:
-        if not self._block.has_lattice:
-            pose, labels = self.state["pose"], self.state["assembly"]
-            return disc_class(pose, labels, **self._block.contact_size)
-        return LatticeWorld.of(self.state).outcome(self._chirality)
+        return state_class(self.state, self._study)
 
 
 class _NextSettings(NamedTuple):
@@ -168,7 +164,6 @@ class LiveTank:
                 plan.study, self._next_settings.flow_scale
             )
             self._set_forces()
-            self._set_pull()
             self._steps_per_interval = round(forces.force_interval_s / plan.study.time_step_s)
             self._due = 0.0
             self._events: list[LiveEvent] = []
@@ -253,8 +248,6 @@ class LiveTank:
         InputError
             When a value is out of range or the blocks cannot fit the tank. Nothing changes then.
         """
-        from driftwalk.model import apply_overrides
-
         given = {
             "forces.drag_coefficient": drag_coefficient,
             "forces.force_std_N": force_std,
@@ -356,8 +349,7 @@ class LiveTank:
     @property
     def assembly(self) -> npt.NDArray[np.int32]:
         """Lowest block of each block's assembly: blocks with equal numbers are joined."""
-        labels: npt.NDArray[np.int32] = self._moment.state["assembly"].copy()
-        return labels
+        return self._moment.state["assembly"].copy()
 
     @property
     def poles(self) -> npt.NDArray[np.int32]:
@@ -384,14 +376,13 @@ class LiveTank:
 
     def _go(self, steps: int) -> None:
         """Take time steps, and what is wished at the beginning of force intervals."""
-        while steps > 0:
+        end = self._world.step + steps
+        while (left := end - self._world.step) > 0:
             into = self._world.step % self._steps_per_interval
             if into == 0:
                 self._fulfil()
             waits = self._next_settings is not self._active or self.waiting > 0
-            now = min(steps, self._steps_per_interval - into) if waits else steps
-            self._step(now)
-            steps -= now
+            self._step(min(left, self._steps_per_interval - into) if waits else left)
 
     def _fulfil(self) -> None:
         """Give the world what is wished, at the beginning of a force interval."""
@@ -399,12 +390,9 @@ class LiveTank:
             following = self._next_settings
             changed = following is not self._active
             before = self._active.study.assembly
-            self._next_settings = self._active = (
-                following._replace(part=False) if following.part else following
-            )
+            self._next_settings = self._active = following._replace(part=False)
         if changed:
             self._set_forces()
-            self._set_pull()
             rules = self._active.study.assembly
             self._world.set_rules(
                 latching=rules.latching,
@@ -425,48 +413,36 @@ class LiveTank:
             self._look()
 
     def _set_forces(self) -> None:
-        forces = self._active.study.forces
+        forces, pull = self._active.study.forces, block_pull(self._active.study)
         self._world.set_forces(
             drag_coefficient=forces.drag_coefficient,
             force_std=forces.force_std_N,
             flow_scale=self._active.flow_scale,
         )
-
-    def _set_pull(self) -> None:
-        pull = block_pull(self._active.study)
         self._world.set_pull(None if pull is None else pull.native)
 
     def _step(self, steps: int) -> None:
-        """Take time steps and note what has joined and parted in them."""
-        end = self._world.step + steps
-        while self._world.step < end:
-            self._step_some(end - self._world.step)
-
-    def _step_some(self, steps: int) -> None:
         """Take time steps, fewer where there are too many events, and note these."""
         study = self._active.study
         state = self._world.state()
-        lattice = LatticeWorld.of(state)
-        bonds = BondGraph(1, lattice.blocks)
-        bonds.put(np.zeros(len(state["bond"]), dtype=np.int64), state["bond"], True)
+        blocks, chirality = len(state["assembly"]), study.assembly.chirality
+        world = SquareWorld(blocks, chirality) if self.has_lattice else DiscWorld(blocks)
+        world.begin(state)
         found = self._world.advance(steps)
         pose = self._world.state()["pose"]
         times = times_of(found["step"], time_step=study.time_step_s).tolist()
         kinds, pairs, faces = (found[name].tolist() for name in ("kind", "block", "face"))
         for time, kind, pair, joined in zip(times, kinds, pairs, faces, strict=True):
-            blocks = (pair[0], pair[1])
-            bonds.put(np.zeros(1, dtype=np.int64), np.array([pair]), kind in (JOINING, CLOSING))
-            if kind == JOINING and self.has_lattice:
-                lattice.join(blocks, (joined[0], joined[1]))
-            elif kind == JOINING:
-                lattice.partition.unite(blocks)
-            elif kind == PARTING:
-                side = bonds.reached(np.zeros(1, dtype=np.int64), np.array(pair[:1]))[0]
-                lattice.partition.cut(np.flatnonzero(side).tolist())
+            if kind == PARTING:
+                world.part(pair)
             else:
+                world.bond(pair, whole=kind in (JOINING, CLOSING))
+            if kind == JOINING:
+                world.join(pair, joined)
+            elif kind != PARTING:
                 continue
-            if self.has_lattice:
-                outcome = lattice.outcome(study.assembly.chirality)
-            else:
-                outcome = disc_class(pose, lattice.partition.labels, **study.block.contact_size)
-            self._events.append(LiveEvent(time, blocks, outcome, is_parting=kind == PARTING))
+            now = {"pose": pose, "cell": np.array(world.cell), "assembly": np.array(world.body)}
+            outcome = state_class(now, study)
+            self._events.append(
+                LiveEvent(time, (pair[0], pair[1]), outcome, is_parting=kind == PARTING)
+            )

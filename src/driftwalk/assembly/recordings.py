@@ -177,8 +177,7 @@ def _unknown_blocks(poses: Poses, hold: float) -> Bools:
     sample = np.arange(poses.time.size)[:, None]
     last = np.maximum.accumulate(np.where(poses.seen, sample, -1), axis=0)
     age = poses.time[:, None] - poses.time[last]
-    unknown: Bools = (last < 0) | (age > hold * (1.0 + ROUNDING))
-    return unknown
+    return np.asarray((last < 0) | (age > hold * (1.0 + ROUNDING)))
 
 
 def _shares(outcome: npt.NDArray[np.int32], lasts: Floats, classes: int) -> Floats:

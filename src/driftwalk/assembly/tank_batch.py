@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.lattice.join_history import LatticeWorld
-from driftwalk.assembly.outcomes.outcome_classes import disc_class
+from driftwalk.assembly.outcomes.outcome_classes import state_class
 from driftwalk.assembly.pull.force_tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import (
@@ -26,12 +25,12 @@ from driftwalk.assembly.runs.plan import (
 from driftwalk.assembly.runs.start import glued_cells, require_room
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
+from driftwalk.model import Study, apply_overrides
 from driftwalk.simulation.backend import BROKEN
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
 
 State = Mapping[str, npt.NDArray[Any]]
 Complete = Literal["moves", "rests"]
@@ -148,47 +147,44 @@ class TankBatch:
         ]
         plan = plans[0]
         self._study, self._threads = plan.study, plan.threads
-        # What the native core points to.
-        self._kept = ([one.model() for one in plans], block_pull(plan.study), plan.rules())
+        joined: dict[str, npt.NDArray[Any]] | None = None
         if isinstance(start, Mapping):
             joined = _joined(start, plan)
-            self._batch = self._begin(plans, joined["pose"], joined)
-            self._require_lattice(joined["pose"])
+            poses = joined["pose"]
         else:
-            self._batch = self._begin(plans, start_poses(plan, start), None)
-        forces = plan.study.forces
+            poses = start_poses(plan, start)
+        models, pull, rules = [one.model() for one in plans], block_pull(plan.study), plan.rules()
+        # What the native core points to.
+        self._kept = models, pull, rules
+        self._batch = _core.TankBatch(
+            models,
+            start=np.ascontiguousarray(poses),
+            key=plan.keys,
+            precision="double" if backend == "reference" else "single",
+            **{name: value for name, value in rules.items() if name != "latching"},
+            pull=None if pull is None else pull.native,
+            glued=None if joined is not None else glued_cells(plan.study.assembly),
+            flow_start=[one.flow_start for one in plans],
+            joined=joined,
+            threads=plan.threads,
+        )
+        if joined is not None:
+            self._require_lattice(poses)
+        forces, settings = plan.study.forces, plan.study.assembly
         self._settings = self._next_settings = _Settings(
             flow=np.zeros(count, dtype=np.int32),
-            latching=np.full(count, _LATCHING.index(plan.study.assembly.latching), dtype=np.int32),
+            latching=np.full(count, _LATCHING.index(settings.latching), dtype=np.int32),
             flow_scale=np.ones(count),
             drag_coefficient=np.full(count, forces.drag_coefficient),
             force_std=np.full(count, forces.force_std_N),
         )
         self._steps_per_interval = round(forces.force_interval_s / plan.study.time_step_s)
         self._due = 0.0
-        rules = plan.study.assembly
-        self._rests = complete == "rests" and rules.blocks > 1 and not rules.bonds_break
+        self._rests = complete == "rests" and settings.blocks > 1 and not settings.bonds_break
         self._resting = np.zeros(count, dtype=bool)
         self._names: dict[bytes, str] = {}
         self._outcome = np.full(count, "", dtype=object)
         self._name(np.ones(count, dtype=bool))
-
-    def _begin(
-        self, plans: list[Plan], poses: Floats, joined: dict[str, npt.NDArray[Any]] | None
-    ) -> _core.TankBatch:
-        models, pull, rules = self._kept
-        return _core.TankBatch(
-            models,
-            start=np.ascontiguousarray(poses),
-            key=plans[0].keys,
-            precision="double" if plans[0].backend == "reference" else "single",
-            **{name: value for name, value in rules.items() if name != "latching"},
-            pull=None if pull is None else pull.native,
-            glued=None if joined is not None else glued_cells(self._study.assembly),
-            flow_start=[one.flow_start for one in plans],
-            joined=joined,
-            threads=self._threads,
-        )
 
     def set(
         self,
@@ -324,12 +320,9 @@ class TankBatch:
         keys = stream_keys("run", seed=seed, trial=0, index=first + np.arange(index.size))
         taken = copy(self)
         taken._batch = self._batch.take(index.tolist(), keys)
-        taken._settings = _Settings(*(values[index] for values in self._settings))
-        wait = self._settings is not self._next_settings
-        taken._next_settings = (
-            _Settings(*(values[index] for values in self._next_settings))
-            if wait
-            else taken._settings
+        taken._settings, taken._next_settings = (
+            _Settings(*(values[index] for values in one))
+            for one in (self._settings, self._next_settings)
         )
         taken._outcome, taken._resting = self._outcome[index], self._resting[index]
         return taken
@@ -383,8 +376,6 @@ class TankBatch:
 
     def _latching(self, names: npt.NDArray[np.str_]) -> npt.NDArray[np.int32]:
         """Return the native core's numbers of ways to latch, after checking them."""
-        from driftwalk.model import apply_overrides
-
         number = np.zeros(names.size, dtype=np.int32)
         for name in np.unique(names).tolist():
             require_room(apply_overrides(self._study, {"assembly.latching": name}))
@@ -397,20 +388,15 @@ class TankBatch:
             return
         state, sound = self._batch.state(), self.sound
         self._resting = self._rests & (state["assembly"] == 0).all(axis=1)
-        rules = self._study.assembly
         for world in np.flatnonzero(changed).tolist():
             own = {name: values[world] for name, values in state.items()}
+            address = own["assembly"].tobytes() + own["cell"].tobytes()
             if not sound[world]:
                 self._outcome[world] = ""
-            elif not self._study.block.has_lattice:
-                self._outcome[world] = disc_class(
-                    own["pose"], own["assembly"], **self._study.block.contact_size
-                )
-            else:
-                address = own["assembly"].tobytes() + own["cell"].tobytes()
-                if address not in self._names:
-                    self._names[address] = LatticeWorld.of(own).outcome(rules.chirality)
+            elif self._study.block.has_lattice and address in self._names:
                 self._outcome[world] = self._names[address]
+            else:
+                self._outcome[world] = self._names[address] = state_class(own, self._study)
 
     def _require_lattice(self, given: Floats) -> None:
         """Refuse a start beyond the tank, or off the lattices of its assemblies."""

@@ -144,23 +144,14 @@ class Cluster:
 
     def report(self) -> str:
         """Return what happened to the workers, in a sentence; nothing where all went well."""
-        again = self.executor.units.again
-        said = []
-        if self._lost:
-            said.append(
-                f"{_number(self._lost, 'worker')} {_was(self._lost)} lost; the units there were "
-                "computed again"
-            )
-        if self._ended:
-            said.append(
-                f"{_number(self._ended, 'worker')} ended before the run did, such as jobs whose "
-                "time was over; the units there were computed again"
-            )
-        if again:
-            said.append(
-                f"{_number(again, 'unit')} took long and {_was(again)} computed by a second "
-                "worker, too"
-            )
+        lost, ended, again = self._lost, self._ended, self.executor.units.again
+        events = (
+            (lost, "worker", f"{_was(lost)} lost; the units there were computed again"),
+            (ended, "worker", "ended before the run did, such as jobs whose time was over; the "
+             "units there were computed again"),
+            (again, "unit", f"took long and {_was(again)} computed by a second worker, too"),
+        )  # fmt: skip
+        said = [f"{_number(count, what)} {why}" for count, what, why in events if count]
         return "; ".join([*said, "the result is the same"]) if said else ""
 
     def let_go(self) -> None:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.model import Study, apply_overrides
 from driftwalk.schema.tracking_noise import estimate_tracking_noise, noise_bound
 from driftwalk.simulation.backend import Camera
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
     from driftwalk.schema import Track
 
 
@@ -162,15 +163,8 @@ def study_as_seen(study: Study, recording: xr.Dataset, track: Track) -> Study:
     >>> round(seen.position_noise_m, 4)
     0.0003
     """
-    from driftwalk.model import apply_overrides
-
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
     camera = recorded_camera(track, study, position_quantum=quantum)
-    return apply_overrides(
-        study,
-        {
-            "observation.position_noise_m": camera.position_noise,
-            "observation.orientation_noise_rad": camera.orientation_noise,
-            "observation.position_quantum_m": camera.position_quantum,
-        },
-    )
+    keys = ("position_noise_m", "orientation_noise_rad", "position_quantum_m")
+    seen = zip(keys, astuple(camera), strict=True)
+    return apply_overrides(study, {f"observation.{key}": value for key, value in seen})

@@ -10,12 +10,12 @@ from driftwalk.conditions.refuse import prefix_of, require_motion, require_posit
 from driftwalk.conditions.study import is_stated, study_for, study_in_arena
 from driftwalk.core.errors import InputError
 from driftwalk.core.text_files import parse_json
+from driftwalk.model import Study, apply_overrides
 from driftwalk.record import load
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
 
 Tank = Literal["stated", "unsaid"]
 Bodies = Literal["named", "all"]
@@ -77,8 +77,6 @@ def read_recordings(
     >>> read.study.tank.diameter_m
     0.32
     """
-    from driftwalk.model import apply_overrides
-
     values = dict(given or {})
     trajectories, of_files = [], []
     for path in paths:
@@ -198,8 +196,6 @@ def load_for_run(
     >>> dw.conditions.load_for_run(path, dw.Study(), {}, tank="unsaid")[1]
     False
     """
-    from driftwalk.model import apply_overrides
-
     if tank == "unsaid" and path.suffix.lower() == ".nc":
         own = load_with_study(path, apply_overrides(study, {"recording.arena": "file"}), given)
         if "arena" in own.attrs:

@@ -357,12 +357,11 @@ def simulate_like(
     """
     track = body_track(recording, body)
     study = study_as_seen(study, recording, track)
-    begin = recorded_start(track)
     return simulate(
         study,
         flow,
         sample_time=sample_times(track, study),
-        start=begin,
+        start=recorded_start(track),
         flow_start=0.0,
         replicates=replicates,
         seed=seed,

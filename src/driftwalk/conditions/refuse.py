@@ -13,6 +13,7 @@ import numpy as np
 
 from driftwalk.conditions.camera import recorded_camera
 from driftwalk.core.errors import InputError
+from driftwalk.model import Study, apply_overrides
 from driftwalk.record import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.schema import Track, body_names, body_track
 from driftwalk.schema.outliers import outliers_warning, without_far_outliers
@@ -20,8 +21,6 @@ from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from driftwalk.model import Study
 
 
 class MotionPolicy(NamedTuple):
@@ -142,8 +141,6 @@ def require_travel(
     >>> from driftwalk.schema import body_track
     >>> require_travel(body_track(dw.tank30_recording(), None), dw.Study())
     """
-    from driftwalk.model import apply_overrides
-
     begin = f"{where}: " if str(where) else ""
     tail = 0.5 * (1.0 - _MOTION.kept)
     width = max(float(np.ptp(np.quantile(axis, (tail, 1.0 - tail)))) for axis in (track.x, track.y))

@@ -11,6 +11,7 @@ from driftwalk.conditions.refuse import prefix_of
 from driftwalk.core.errors import InputError
 from driftwalk.core.units import in_percent
 from driftwalk.flow.arena import outline_of
+from driftwalk.model import Study, Tank, apply_overrides, parse_study
 from driftwalk.schema import body_track
 from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.answers.parts import undetermined
@@ -20,8 +21,6 @@ from driftwalk.schema.trajectory import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from driftwalk.model import Study
 
 
 OUTLINE: Final = ("shape", "diameter_m", "width_m", "height_m", "vertices_m")
@@ -61,8 +60,6 @@ def study_in_arena(study: Study, recording: xr.Dataset) -> Study:
     >>> study_in_arena(wide, dw.tank30_recording()).tank.diameter_m
     0.3
     """
-    from driftwalk.model import Tank, apply_overrides
-
     arena = recording.attrs.get("arena")
     if arena is None:
         return study
@@ -186,8 +183,6 @@ def study_for(
     >>> dw.conditions.study_for([dw.tank30_recording()]).tank.diameter_m
     0.3
     """
-    from driftwalk.model import Study, apply_overrides
-
     chosen = apply_overrides(study if study is not None else Study(), overrides or {})
     # A fact that is stated already, by the study or by an earlier recording, has to be the same.
     tank = is_stated(chosen, "tank.diameter_m")
@@ -237,8 +232,6 @@ def study_of_block(
     >>> study_of_block(dw.Study(), dw.tank30_recording()).block.mass_kg
     0.0116
     """
-    from driftwalk.model import apply_overrides
-
     known = set(study.block.model_fields_set if stated is None else stated)
     added: dict[str, Any] = {}
     for key, (name, unit, word, way) in _BLOCK_ATTRIBUTES.items():
@@ -318,8 +311,6 @@ def estimated_study(
     >>> estimated_study(fit).forces.drag_coefficient  # doctest: +SKIP
     0.393
     """
-    from driftwalk.model import apply_overrides, parse_study
-
     stated = overrides or {}
     unknown = undetermined(found)
     for key, name in FORCE_KEYS.items():
@@ -364,8 +355,6 @@ def fitted_law(found: xr.Dataset) -> dict[str, Any]:
 
 
 def _is_glued(found: xr.Dataset) -> bool:
-    from driftwalk.model import parse_study
-
     return len(parse_study(found.attrs["study"]).block.body().cells) > 1
 
 

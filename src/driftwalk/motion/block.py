@@ -12,8 +12,8 @@ from driftwalk.core.errors import InputError
 from driftwalk.motion.protocol import Values
 from driftwalk.motion.score import NativeModel
 from driftwalk.schema import Parameter
-from driftwalk.simulation.backend import native_model, world_table
-from driftwalk.simulation.initial import world_orientations
+from driftwalk.simulation.backend import native_model
+from driftwalk.simulation.initial import world_table
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -74,9 +74,9 @@ class BlockModel(NativeModel):
         return native_model(self.study, like.flow, like.sample_time, like.camera), None
 
     def _worlds(self, values: Values, like: Conditions, keys: Keys) -> tuple[Floats, None]:
-        start = like.start._replace(theta=world_orientations(like.start.theta, keys))
         table = world_table(
-            **start._asdict(),
+            like.start,
+            keys,
             drag_coefficient=values["drag_coefficient"],
             force_std=values["force_std"],
         )

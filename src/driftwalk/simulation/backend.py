@@ -5,7 +5,7 @@ The walls of tanks and fields of view are here too, and the refusal of a flow th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -214,9 +214,7 @@ def _surroundings(
         "friction": tank.wall_friction,
         "bounce_speed": tank.bounce_speed_m_s,
         "sample_time": np.ascontiguousarray(sample_time, dtype=np.float64),
-        "position_noise": camera.position_noise,
-        "orientation_noise": camera.orientation_noise,
-        "position_quantum": camera.position_quantum,
+        **asdict(camera),
         **_field_of_view(view),
     }
 
@@ -367,24 +365,3 @@ def _range(x: npt.ArrayLike, y: npt.ArrayLike) -> str:
         f"{name} from {low:.4g} to {high:.4g} m"
         for name, (low, high) in zip("xy", ends, strict=True)
     )
-
-
-def world_table(
-    *,
-    x: npt.ArrayLike,
-    y: npt.ArrayLike,
-    theta: npt.ArrayLike,
-    vx: npt.ArrayLike = 0.0,
-    vy: npt.ArrayLike = 0.0,
-    omega: npt.ArrayLike = 0.0,
-    drag_coefficient: npt.ArrayLike,
-    force_std: npt.ArrayLike,
-) -> Floats:
-    """Return start poses [m, rad], motions [m/s, rad/s] and parameters of worlds, shape (n, 8)."""
-    columns = np.broadcast_arrays(
-        *(
-            np.atleast_1d(np.asarray(values, dtype=np.float64))
-            for values in (x, y, theta, vx, vy, omega, drag_coefficient, force_std)
-        )
-    )
-    return np.ascontiguousarray(np.stack(columns, axis=1))

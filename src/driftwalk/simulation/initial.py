@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +13,10 @@ from driftwalk import _core
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import Purpose
-
-if TYPE_CHECKING:
-    from driftwalk.model import Study, Tank
+from driftwalk.model import Study, Tank
+from driftwalk.model.simulation import Pose
+from driftwalk.model.study import block_corners
+from driftwalk.model.tank import edges, inward_distance
 
 Fits = Callable[[float, float, float], bool]
 """Whether there is room for a pose x, y [m], theta [rad]."""
@@ -48,9 +49,6 @@ def random_start(study: Study, keys: Keys) -> Start:
     InputError
         When no pose that fits was found in 1000 draws.
     """
-    from driftwalk.model.simulation import Pose
-    from driftwalk.model.study import block_corners
-
     tank, block = study.tank, study.block
 
     def fits(x: float, y: float, theta: float) -> bool:
@@ -70,8 +68,6 @@ def random_place(tank: Tank, keys: Keys, *, clearance: float = 0.0) -> Start:
     InputError
         When no place so far from the wall was found in 1000 draws.
     """
-    from driftwalk.model.tank import edges, inward_distance
-
     sides = edges(tank.corners_m) if tank.radius_m is None else ()
 
     def fits(x: float, y: float, _: float) -> bool:
@@ -115,3 +111,15 @@ def world_orientations(theta: npt.ArrayLike, keys: Keys) -> Floats:
         word = _core.philox(int(keys[index]), [0, 0, 0, Purpose.START])[0]
         given[index] = (word * 2.0**-31 - 1.0) * np.pi
     return given
+
+
+def world_table(
+    start: Start, keys: Keys, *, drag_coefficient: npt.ArrayLike, force_std: npt.ArrayLike
+) -> Floats:
+    """Return start poses [m, rad], motions [m/s, rad/s] and parameters of worlds, shape (n, 8).
+
+    A world without an orientation draws its own.
+    """
+    begin = start._replace(theta=world_orientations(start.theta, keys))
+    values = (np.asarray(one, np.float64) for one in (*begin, drag_coefficient, force_std))
+    return np.ascontiguousarray(np.stack(np.broadcast_arrays(*values), axis=1))

@@ -15,8 +15,8 @@ from driftwalk.core.processors import default_threads
 from driftwalk.core.random_streams import world_keys
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.trajectory import POSE
-from driftwalk.simulation.backend import Camera, check_sample_time, native_model, world_table
-from driftwalk.simulation.initial import Start, random_start, world_orientations
+from driftwalk.simulation.backend import Camera, check_sample_time, native_model
+from driftwalk.simulation.initial import Start, random_start, world_table
 from driftwalk.simulation.series import continued_flow, flow_starts, series_facts
 
 if TYPE_CHECKING:
@@ -100,10 +100,9 @@ def simulate(
     if starts is not None and flow_start is not None:
         starts = np.full(count, float(flow_start))
     model = native_model(study, water, times, plain_camera(study))
+    forces = study.forces
     worlds = world_table(
-        **begin._replace(theta=world_orientations(begin.theta, keys))._asdict(),
-        drag_coefficient=np.full(count, study.forces.drag_coefficient),
-        force_std=study.forces.force_std_N,
+        begin, keys, drag_coefficient=forces.drag_coefficient, force_std=forces.force_std_N
     )
     try:
         x, y, theta, status = _core.simulate(
@@ -122,7 +121,6 @@ def simulate(
             "(`simulation.replicates`, `simulation.sample_rate_Hz`) or a shorter time "
             "(`simulation.duration_s`)"
         ) from error
-    forces = study.forces
     attrs = {
         "arena": study.tank.to_arena_json(),
         "drag_coefficient": forces.drag_coefficient,

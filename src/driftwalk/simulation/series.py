@@ -71,9 +71,17 @@ def flow_since(flow: xr.Dataset | None, begin: float) -> xr.Dataset | None:
 
 
 def series_of(flow: xr.Dataset) -> Series:
-    """Return the clock of a flow in frames that `continued_flow` has returned."""
+    """Return the clock of a flow in frames; of how it goes on what `continued_flow` has added.
+
+    Raises
+    ------
+    InputError
+        When its times do not increase.
+    """
     attrs = flow.attrs
     time = np.ascontiguousarray(flow["time"].values, dtype=np.float64)
+    if not (np.diff(time) > 0).all():
+        raise InputError("the times of the flow field do not increase")
     return Series(
         time,
         str(attrs.get("repeat", "none")),
@@ -120,13 +128,10 @@ def continued_flow(
     """
     if not is_series(flow):
         return flow
-    time = flow["time"].values.astype(np.float64)
-    steps = np.diff(time)
-    if not (steps > 0).all():
-        raise InputError("the times of the flow field do not increase")
+    series = series_of(flow)
+    time, span, interval = series.time, series.span, float(np.median(np.diff(series.time)))
     stated = study.flow.repeat
-    repeat = stated if stated != "none" else str(flow.attrs.get("repeat", "none"))
-    span, interval = float(time[-1] - time[0]), float(np.median(steps))
+    repeat = stated if stated != "none" else series.repeat
     if repeat == "none":
         missing = min(interval, _CONTINUATION.most_missing * span)
         first = float(time[0]) if begin is None else begin
@@ -236,8 +241,6 @@ def frames_of(flow: xr.Dataset) -> tuple[Floats, Floats, Floats, str]:
         return u.reshape(-1, *u.shape[-2:]), v.reshape(-1, *v.shape[-2:]), np.zeros(1), "hold"
     series = series_of(flow)
     time = series.time
-    if (np.diff(time) <= 0).any():
-        raise InputError("the times of the flow field do not increase")
     if series.repeat == "loop" and series.closing:
         u, v = (np.concatenate([values, values[:1]]) for values in (u, v))
         time = np.append(time, time[-1] + series.closing)

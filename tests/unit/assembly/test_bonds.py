@@ -278,8 +278,8 @@ def test_classify_reads_joinings_and_partings_of_a_simulated_recording() -> None
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", ["square", "disc", "rectangle"])
 def test_many_blocks_part_as_few_do(shape: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Worlds of more than 64 blocks are replayed by other code: it gives the same for fewer.
-    from driftwalk.assembly.lattice import events
+    # Worlds of more than 64 blocks have counted classes, and the same shapes of few blocks.
+    from driftwalk.assembly.lattice import events, replayed_worlds
 
     rule = dw.Study(
         tank={"diameter_m": 0.25},
@@ -288,7 +288,8 @@ def test_many_blocks_part_as_few_do(shape: str, monkeypatch: pytest.MonkeyPatch)
     )
     flow = dw.vortex_flow(angular_velocity=0.6, core_radius=0.04, arena=rule.tank.to_arena())
     few = dw.assemble(rule, flow, blocks=12, runs=3, duration=30.0)
-    monkeypatch.setattr(events, "MOST_NAMED", 8)
+    for module in (events, replayed_worlds):
+        monkeypatch.setattr(module, "MOST_NAMED", 8)
     many = dw.assemble(rule, flow, blocks=12, runs=3, duration=30.0)
     assert (few["event_kind"] == 1).any()
     xr.testing.assert_equal(few["event_assembly"], many["event_assembly"])

@@ -12,7 +12,7 @@ from single_block import SIDE, model, swirl
 
 import driftwalk as dw
 from driftwalk.assembly import assembly_sizes, replay_events
-from driftwalk.assembly.lattice import events as module
+from driftwalk.assembly.lattice import events, replayed_worlds
 from driftwalk.assembly.lattice.events import replay_contacts
 from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.outcome_classes import sort_classes, world_class
@@ -30,11 +30,12 @@ def events_of(seed: int = 3) -> dict[str, np.ndarray]:
     return raw_arrays([random_run(BLOCKS, rng, stop=1.0) for _ in range(6)], BLOCKS)
 
 
-def test_run_after_run_is_as_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The two ways share no code: shapes of the same size and perimeter, as many assemblies."""
+def test_what_is_counted_is_as_what_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shapes of the same size and perimeter, as many assemblies."""
     raw = events_of()
     names = replay_events(**raw)
-    monkeypatch.setattr(module, "MOST_NAMED", BLOCKS - 1)
+    for module in (events, replayed_worlds):
+        monkeypatch.setattr(module, "MOST_NAMED", BLOCKS - 1)
     counted = replay_events(**raw)
     np.testing.assert_array_equal(counted.event_assembly, names.event_assembly)
     assert any(counts_of_shape(name)[0] > 8 for name in counted.shapes)
@@ -56,11 +57,7 @@ def test_run_after_run_is_as_side_by_side(monkeypatch: pytest.MonkeyPatch) -> No
         assert [int(counted.classes[one].split()[0]) for one in number[own >= 0]] == assemblies
 
 
-def test_many_blocks_that_part_are_replayed_one_run_at_a_time(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    # No (run, block, block) array: a run of 2000 blocks would have 4 MB of it.
-    monkeypatch.delattr(module, "BondGraph")
+def test_many_blocks_that_part_are_replayed() -> None:
     bar = np.zeros((2, 70, 2), dtype=int)
     made = replay_events(
         [3, 2],
@@ -95,7 +92,8 @@ def test_a_recording_of_many_blocks_is_classified() -> None:
 
 
 def test_what_cannot_be_names_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_NAMED", BLOCKS - 1)
+    for module in (events, replayed_worlds):
+        monkeypatch.setattr(module, "MOST_NAMED", BLOCKS - 1)
     raw = events_of()
     twice = {name: values.copy() for name, values in raw.items()}
     twice["event_block"][2, 1] = twice["event_block"][2, 0]

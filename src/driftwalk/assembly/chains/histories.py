@@ -53,34 +53,25 @@ class Histories(NamedTuple):
 
     def of(self, chosen: Bools) -> Histories:
         """Return the histories of chosen runs, shape (run,), numbered from 0."""
-        kept = chosen[self.run]
-        number = np.cumsum(chosen) - 1
-        return self._replace(
-            run=number[self.run[kept]],
-            state=self.state[kept],
-            duration=self.duration[kept],
-            target=self.target[kept],
-            runs=int(chosen.sum()),
-        )
+        found, number = self._sojourns(chosen[self.run]), np.cumsum(chosen) - 1
+        return found._replace(run=number[found.run], runs=int(chosen.sum()))
 
     @property
     def entry(self) -> Floats:
         """When each sojourn began, from the start of its run [s]."""
         before = np.cumsum(self.duration) - self.duration
-        entry: Floats = before - np.maximum.accumulate(np.where(self.first, before, 0.0))
-        return entry
+        return before - np.maximum.accumulate(np.where(self.first, before, 0.0))
 
     def until(self, end: float) -> Histories:
         """Return what is seen of the histories up to a time from the start of their runs [s]."""
         begun = self.entry < end
         left = np.minimum(self.duration, end - self.entry)
         target = np.where(left < self.duration, OPEN, self.target)
-        return self._replace(
-            run=self.run[begun],
-            state=self.state[begun],
-            duration=left[begun],
-            target=target[begun],
-        )
+        return self._replace(duration=left, target=target)._sojourns(begun)
+
+    def _sojourns(self, kept: Bools) -> Histories:
+        columns = ("run", "state", "duration", "target")
+        return self._replace(**{name: getattr(self, name)[kept] for name in columns})
 
     def recorded_s(self) -> float:
         """Return the length of the longest run [s]."""
@@ -149,43 +140,28 @@ def blocks_of(name: str) -> int:
 
 def _listed(rows: list[tuple[list[str], Floats, float]], names: tuple[str, ...]) -> Histories:
     place = {name: index for index, name in enumerate(names)}
-    run, state, target = [], [], []
-    duration: list[Floats] = []
-    for number, (passed, entry, end) in enumerate(rows):
-        run += [number] * len(passed)
-        state += [place[name] for name in passed]
-        target += [*(place[name] for name in passed[1:]), OPEN]
-        duration += [entry[1:] - entry[:-1], np.array([end - entry[-1]])]
-    lasts = np.concatenate(duration)
+    run = np.repeat(np.arange(len(rows)), [len(passed) for passed, _, _ in rows])
+    state = np.array([place[name] for passed, _, _ in rows for name in passed], dtype=np.int64)
+    target = np.append(state[1:], OPEN)
+    target[np.flatnonzero(np.diff(run))] = OPEN
+    lasts = np.concatenate([np.diff(entry, append=end) for _, entry, end in rows])
     # Two events of one time step: the class between them lasted less than the step.
     shortest = lasts[lasts > 0].min(initial=1.0)
-    return Histories(
-        names,
-        np.array(run, dtype=np.int64),
-        np.array(state, dtype=np.int64),
-        np.maximum(lasts, 0.5 * shortest),
-        np.array(target, dtype=np.int64),
-        len(rows),
-    )
+    return Histories(names, run, state, np.maximum(lasts, 0.5 * shortest), target, len(rows))
 
 
 def _of_runs(assembly: xr.Dataset) -> list[tuple[list[str], Floats, float]]:
-    """Return class names, entry times and end of every run; joinings and partings in order."""
+    """Return class names, entry times and end of every run."""
     names = [str(name) for name in assembly["class"].values]
     start = all_single(int(assembly.attrs["blocks"]))
-    kinds = [one for one in ("event", "split") if f"{one}_time" in assembly]
-    time = np.concatenate([assembly[f"{one}_time"].values for one in kinds], axis=1)
-    after = np.concatenate([assembly[f"{one}_class"].values for one in kinds], axis=1)
-    order = np.argsort(np.where(np.isfinite(time), time, np.inf), axis=1, kind="stable")
-    time, after = (np.take_along_axis(one, order, axis=1) for one in (time, after))
-    end = assembly["end_time"].values
+    time, after, end = (assembly[name].values for name in ("event_time", "event_class", "end_time"))
     real = np.isfinite(time) & (after >= 0)
     rows = []
     for at in np.flatnonzero(assembly["outcome"].values >= 0):
         passed = [start, *(names[index] for index in after[at, real[at]].tolist())]
         entry = np.concatenate([[0.0], time[at, real[at]]])
         begun = int((entry == 0.0).nonzero()[0][-1])  # glued blocks join at time 0
-        rows.append(_merged(passed[begun:], entry[begun:], float(end[at])))
+        rows.append((*merged_history(passed[begun:], entry[begun:]), float(end[at])))
     return rows
 
 
@@ -196,10 +172,10 @@ def _of_recording(found: xr.Dataset) -> list[tuple[list[str], Floats, float]]:
         return []
     time: npt.NDArray[Any] = found["time"].values[known]
     names = found["class"].values[found["outcome"].values[known]]
-    return [_merged([str(name) for name in names], time, float(time[-1]))]
+    return [(*merged_history([str(name) for name in names], time), float(time[-1]))]
 
 
-def _merged(passed: list[str], entry: Floats, end: float) -> tuple[list[str], Floats, float]:
-    """Return a history in which a class is entered only from another one."""
+def merged_history(passed: list[str], entry: Floats) -> tuple[list[str], Floats]:
+    """Return a history, names and entry times, in which a class is entered only from another."""
     fresh = [0, *(k for k in range(1, len(passed)) if passed[k] != passed[k - 1])]
-    return [passed[k] for k in fresh], entry[fresh], end
+    return [passed[k] for k in fresh], entry[fresh]

@@ -125,8 +125,7 @@ def _posterior(parameters: Floats, random: np.random.Generator | None) -> Floats
         # A sum of gammas may vanish where all parameters are tiny: then the mean.
         parts = random.standard_gamma(parameters)
         parts = np.where(parts.sum(axis=-1, keepdims=True) > 0, parts, parameters)
-    mean: Floats = parts / parts.sum(axis=-1, keepdims=True)
-    return mean
+    return np.asarray(parts / parts.sum(axis=-1, keepdims=True))
 
 
 class Plan(NamedTuple):

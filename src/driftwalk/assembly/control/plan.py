@@ -67,8 +67,7 @@ class Cells(NamedTuple):
 
     def best(self) -> Integers:
         """Return the mode of each cell with the largest mean, shape (phase, class, age bin)."""
-        best: Integers = (self.reached / (self.reached + self.failed)).argmax(axis=-1)
-        return best
+        return np.asarray((self.reached / (self.reached + self.failed)).argmax(axis=-1))
 
     def drawn(self, worlds: int, random: np.random.Generator) -> Integers:
         """Return modes for worlds, shape (world, phase, class, age bin)."""
@@ -480,19 +479,12 @@ def stored_modes(policy: xr.Dataset) -> Modes:
     policy : xarray.Dataset
         A `control_policy`.
     """
-    import xarray as xr
-
     from driftwalk.model import parse_study
 
     about = {"kind": "flow_field", "schema_version": 1, "arena": policy.attrs["arena"]}
-    fields = (
-        xr.Dataset(
-            {name: (("y", "x"), policy[name].values[at]) for name in ("u", "v", "flag")},
-            {name: (name, policy[name].values) for name in ("y", "x")},
-            about,
-        )
-        for at in range(policy.sizes["field"])
-    )
+    fields = [policy[["u", "v", "flag"]].isel(field=at) for at in range(policy.sizes["field"])]
+    for field in fields:
+        field.attrs = dict(about)
     return Modes(
         parse_study(policy.attrs["study"], source="the policy's study"),
         tuple(fields),

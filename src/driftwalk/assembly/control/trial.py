@@ -116,10 +116,10 @@ def try_control(
     reached = hits[:, :, -1]
     low, high = proportion_interval(reached.sum(axis=1), worlds, confidence=share)
     # The arms run in the same worlds: what counts is the spread of their differences.
-    apart = reached[0] - reached
-    gain = apart.mean(axis=1)
-    half = norm.ppf(0.5 + 0.5 * share) * (apart.std(axis=1, ddof=1) / np.sqrt(worlds))
-    whole = is_complete(classes)
+    ahead = reached[0] - reached
+    gain = ahead.mean(axis=1)
+    half = norm.ppf(0.5 + 0.5 * share) * (ahead.std(axis=1, ddof=1) / np.sqrt(worlds))
+    whole, apart = is_complete(classes), ~np.eye(len(classes), dtype=bool)
     example = _example(policys, target)
     stated, planned = float(policy.attrs["reached"]), int(policy.attrs["worlds"])
     counts = [reached[0].sum(), round(stated * planned)]
@@ -130,11 +130,7 @@ def try_control(
         "share": (("arm", "time"), np.pad(hits.mean(axis=1), ((0, 0), (1, 0)))),
         "usage": (("arm", "mode"), np.stack([_usage(one, whole, modes.size) for one in found])),
         "class_usage": (
-            ("class", "mode"),
-            np.stack([
-                _usage(policys, np.arange(len(classes)) != at, modes.size)
-                for at in range(len(classes))
-            ]),
+            ("class", "mode"), np.stack([_usage(policys, others, modes.size) for others in apart])
         ),
         "film_class": ("time", np.r_[policys["seen"][example], policys["after"][example, -1]]),
         "film_mode": ("time", np.r_[policys["mode"][example], -1]),
@@ -183,13 +179,9 @@ def control_path(policy: xr.Dataset, test: xr.Dataset) -> xr.Dataset:
     )  # fmt: skip
     every = max(round(SAMPLE_S / plan.study.time_step_s), 1)
     sample, latency = every * plan.study.time_step_s, float(facts["latency_s"])
-    changes = {
-        float(time) + (latency if at else 0.0): mode
-        for at, (time, mode) in enumerate(
-            zip(test["time"].values, test["film_mode"].values, strict=True)
-        )
-        if mode >= 0
-    }
+    begins, began = test["time"].values.copy(), test["film_mode"].values
+    begins[1:] += latency
+    changes = {float(at): mode for at, mode in zip(begins, began, strict=True) if mode >= 0}
     samples = sample * np.arange(int(float(facts["by_s"]) / sample) + 1)
     batch = TankBatch(
         modes.study, modes.flows, worlds=1, seed=int(facts["seed"]), first=int(world[0]), workers=1
@@ -229,11 +221,9 @@ def trial_setting(
     InputError
         When a number is out of range.
     """
-    wanted = stored_wanted(policy)
-    if latency is not None:
-        wanted = replace(wanted, latency_s=latency)
-    if missed is not None:
-        wanted = replace(wanted, missed=missed)
+    given = {"latency_s": latency, "missed": missed}
+    over: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    wanted = replace(stored_wanted(policy), **over)
     if worlds < 20:
         raise InputError(f"at least 20 worlds are needed, got {worlds}")
     wanted.require_in_range()

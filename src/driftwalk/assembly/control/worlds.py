@@ -5,14 +5,16 @@ A controller turns what is seen into modes, in simulated worlds and in real ones
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.assembly.control.decision_process import Decisions, age_bin, phase_of
 from driftwalk.assembly.control.modes import Modes
-from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.sweep import WorkUnit
@@ -68,7 +70,7 @@ class Controller:
         """Whether the last decision of each world was open: a class was seen, no dwell held it."""
 
     def decide(
-        self, seen: Integers, age: Integers, *, left: int, wish: Integers | None = None
+        self, seen: Integers, age: Integers, *, left: int, wish: npt.ArrayLike = -1
     ) -> Integers:
         """Return the modes for the next period.
 
@@ -83,7 +85,7 @@ class Controller:
             Whole periods since they were entered.
         left : int
             Decisions that are left, this one too; from 1.
-        wish : ndarray of int, shape (worlds,), optional
+        wish : array_like of int, shape (worlds,), optional
             Modes in place of the policy's, where not negative.
 
         Returns
@@ -91,12 +93,10 @@ class Controller:
         ndarray of int, shape (worlds,)
             The modes.
         """
-        action = self._rules.action[:, phase_of(left)]
+        action, wished = self._rules.action[:, phase_of(left)], np.asarray(wish) >= 0
         wanted = action[self._policy, np.maximum(seen, 0), age_bin(age)]
-        if wish is not None:
-            wanted = np.where(wish >= 0, wish, wanted)
-        looked = seen != UNKNOWN if wish is None else (seen != UNKNOWN) | (wish >= 0)
-        self.free = looked & (self._held >= self._rules.dwell)
+        wanted = np.where(wished, wish, wanted)
+        self.free = ((seen != UNKNOWN) | wished) & (self._held >= self._rules.dwell)
         changed = self.free & (wanted != self.mode)
         self.mode = np.where(changed, wanted, self.mode)
         self._held = np.where(changed, 1, self._held + 1)
@@ -214,10 +214,7 @@ class Worlds:
         controller = Controller(self.rules, world - self.first)
         draw = (world - self.first) // self.turn + self.first // self.turn
         number = {name: at for at, name in enumerate(self.classes)}
-        found = {
-            name: np.empty((world.size, periods), dtype=np.int16)
-            for name in ("seen", "age", "mode", "after", "entered", "free")
-        }
+        found: dict[str, list[Integers | Bools]] = defaultdict(list)
         seen = numbers(batch.outcome, number)
         for period in range(periods):
             since = np.asarray(batch.class_since)
@@ -230,13 +227,13 @@ class Worlds:
             batch.advance(every - (latency if period > 0 else 0.0))
             after = numbers(batch.outcome, number)
             entered = (after != seen) | (np.asarray(batch.class_since) > since)
-            for name, values in (
-                ("seen", seen), ("age", age), ("mode", mode), ("after", after),
-                ("entered", entered), ("free", controller.free),
-            ):  # fmt: skip
-                found[name][:, period] = values
+            for name, values in {
+                "seen": seen, "age": age, "mode": mode, "after": after,
+                "entered": entered, "free": controller.free,
+            }.items():  # fmt: skip
+                found[name].append(values)
             seen = after
-        return found
+        return {name: np.stack(row, axis=1).astype(np.int16) for name, row in found.items()}
 
     def _drawn(self, world: Integers) -> tuple[Integers, Integers]:
         """Return the modes that are wished for, and where the look gives no class."""
@@ -244,9 +241,7 @@ class Worlds:
         wish = np.full((world.size, periods), -1)
         lost = np.zeros((world.size, periods), dtype=bool)
         if self.arm == "constant":
-            wish[:] = (world % modes if self.only is None else np.full(world.size, self.only))[
-                :, None
-            ]
+            wish[:] = (world % modes)[:, None] if self.only is None else self.only
         if self.arm == "random" or self.wanted.missed > 0.0:
             for row, number in enumerate(world.tolist()):
                 random = np.random.default_rng([self.seed, number, STREAM])

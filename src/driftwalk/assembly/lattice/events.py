@@ -1,4 +1,4 @@
-"""Replay the events of simulated runs on the lattice, all runs side by side.
+"""Replay the events of simulated runs on the lattice, and refuse those that cannot be.
 
 The native core gives, for each event, the two blocks and the faces that joined. Everything else
 follows: which assemblies they were, what shapes these had, and the outcome class of the world.
@@ -7,37 +7,45 @@ follows: which assemblies they were, what shapes these had, and the outcome clas
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.joined_faces import (
-    CLOSING,
-    JOINING,
-    OPENING,
-    PARTING,
-    BondGraph,
-    FaceTable,
-)
-from driftwalk.assembly.lattice.many_blocks import (
-    DiscWorld,
-    ReplayedEvents,
-    SquareWorld,
-    replay_many,
-)
-from driftwalk.assembly.lattice.polyomino import Chirality, name_of, require_chirality
+from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, OPENING, FaceTable
+from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
+from driftwalk.assembly.lattice.replayed_worlds import DiscWorld, SquareWorld
 from driftwalk.assembly.outcomes.outcome_classes import (
     class_name,
     contact_pairs,
-    disc_shape,
     listed_classes,
     listed_shapes,
-    touching,
 )
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.shapes import MOST_NAMED, STEPS, all_single, moved_to_origin
+from driftwalk.schema.shapes import MOST_NAMED, all_single, counted_class
+
+
+class ReplayedEvents(NamedTuple):
+    """Results of the events of some runs; -1 where a run had no such event."""
+
+    event_assembly: npt.NDArray[np.int32]
+    """Lowest block of the assembly that stayed and of the one that moved, (run, event, side); of a
+    parting of the two parts."""
+    event_shape: npt.NDArray[np.int32]
+    """Shapes of the two and of what they became, (run, event, part): indices into `shapes`. Of a
+    parting those of the two parts and of what they were; -1 where only a bond of a loop changed."""
+    event_class: npt.NDArray[np.int32]
+    """Outcome class of the world after the event, (run, event): an index into `classes`."""
+    outcome: npt.NDArray[np.int32]
+    """Outcome class at the end, (run,): an index into `classes`."""
+    classes: tuple[str, ...]
+    """Names of the classes: all for up to 8 blocks, beyond that those that occurred."""
+    shapes: tuple[str, ...]
+    """Names of the shapes, by the same rule."""
+    kind: Integers | None = None
+    """Kinds of the blocks at the end, (run, block); None where faces have no types."""
 
 
 def replay_events(
@@ -105,11 +113,8 @@ def replay_events(
     _check_arrays(events, end)
     blocks = end.assembly.shape[1]
     kind = None if faces is None else _follow_kinds(events, faces, end.assembly.shape)
-    if blocks > MOST_NAMED:
-        many = _replay_many(events, end, lambda _: SquareWorld(blocks, chirality))
-        return many._replace(kind=kind)
-    replay = _Replay(end.assembly.shape, events, chirality=chirality)
-    return replay.result(events, end)._replace(kind=kind)
+    found = _replayed(events, end, chirality, lambda _: SquareWorld(blocks, chirality))
+    return found._replace(kind=kind)
 
 
 def replay_contacts(
@@ -132,7 +137,7 @@ def replay_contacts(
     pose : ndarray, shape (runs, blocks, 2 or more)
         Columns x and y at the end [m]; of rectangles the third is theta [rad].
     diameter, width
-        As in `driftwalk.assembly.outcomes.outcome_classes.touching`.
+        As in `driftwalk.assembly.outcomes.outcome_classes.contact_pairs`.
 
     Raises
     ------
@@ -150,24 +155,97 @@ def replay_contacts(
     events = _Events(_whole(event_count), block, np.zeros_like(block), _kinds(event_kind))
     end = _Lattice(np.zeros((*labels.shape, 2), np.int64), np.zeros_like(labels), labels)
     _check_arrays(events, end)
-    if end.assembly.shape[1] > MOST_NAMED:
-        noun = "discs" if width is None else "rectangles"
+    noun = "discs" if width is None else "rectangles"
 
-        def world_of(run: int) -> DiscWorld:
-            told = events.kind is not None
-            pairs = [] if told else contact_pairs(pose[run], diameter=diameter, width=width)
-            return DiscWorld(pose.shape[1], pairs, noun=noun)
+    def world_of(run: int) -> DiscWorld:
+        told = events.kind is not None
+        pairs = [] if told else contact_pairs(pose[run], diameter=diameter, width=width)
+        return DiscWorld(pose.shape[1], pairs, noun=noun)
 
-        return _replay_many(events, end, world_of)
-    return _DiscReplay(pose, events, diameter=diameter, width=width).result(events, end)
+    return _replayed(events, end, None, world_of)
 
 
-def _replay_many(
-    events: _Events, end: _Lattice, world_of: Callable[[int], SquareWorld]
+def _replayed(
+    events: _Events,
+    end: _Lattice,
+    chirality: Chirality | None,
+    world_of: Callable[[int], SquareWorld],
 ) -> ReplayedEvents:
-    found, state = replay_many(*events, blocks=end.assembly.shape[1], world_of=world_of)
-    _check_end(_Lattice(*state), end)
-    return found
+    """Return what the events did, run after run; each begins in its own world."""
+    runs, slots = events.block.shape[:2]
+    blocks = end.assembly.shape[1]
+    cell = np.zeros((runs, blocks, 2), dtype=np.int64)
+    quarter, assembly = (np.zeros((runs, blocks), dtype=np.int64) for _ in range(2))
+    shapes, classes = _Names("1"), _Names(all_single(blocks))
+    kinds = np.full((runs, slots), JOINING) if events.kind is None else events.kind
+    outcome = np.zeros(runs, dtype=np.int64)
+    # Of each event its place, two assemblies, three shapes and the class after it.
+    rows: list[tuple[int, ...]] = []
+    for run in range(runs):
+        world, now = world_of(run), 0
+        shape_of = ["1"] * blocks
+        pairs, faces, told = (one[run].tolist() for one in (events.block, events.face, kinds))
+        for event in range(int(events.number[run])):
+            pair, what = pairs[event], told[event]
+            lowest = [world.lowest[world.body[one]] for one in pair]
+            if what in (OPENING, CLOSING):
+                world.bond(pair, whole=what == CLOSING)
+                rows.append((run, event, *lowest, -1, -1, -1, now))
+                continue
+            try:
+                if what == JOINING:
+                    parts = [shape_of[world.body[one]] for one in pair]
+                    if events.kind is not None:
+                        _touch_all(world, pairs, told, event, int(events.number[run]))
+                    stays, moves = world.join(pair, faces[event])
+                    world.bond(pair, whole=True)
+                    became = shape_of[stays] = world.shape(stays)
+                    shape_of[moves] = ""
+                else:
+                    became = shape_of[world.body[pair[0]]]
+                    two = world.part(pair)
+                    lowest = [world.lowest[body] for body in two]
+                    parts = [world.shape(body) for body in two]
+                    shape_of[two[0]], shape_of[two[1]] = parts
+            except InputError as error:
+                raise InputError(f"run {run}, event {event}: {error}") from None
+            there = [name for name in shape_of if name]
+            named = blocks <= MOST_NAMED
+            name = _class_of(tuple(sorted(there))) if named else counted_class(len(there))
+            now = classes.number(name)
+            rows.append((run, event, *lowest, *map(shapes.number, (*parts, became)), now))
+        cell[run], quarter[run], outcome[run] = world.cell, world.quarter, now
+        assembly[run] = [world.lowest[body] for body in world.body]
+    table = np.full((runs, slots, 6), -1)
+    filled = np.array(rows, dtype=np.int64).reshape(-1, 8)
+    table[filled[:, 0], filled[:, 1]] = filled[:, 2:]
+    shape_names = listed_shapes(shapes.known, blocks, chirality=chirality)
+    class_names = listed_classes(classes.known, blocks, chirality=chirality)
+    class_index = classes.index_into(class_names)
+    _check_end(_Lattice(cell, quarter, assembly), end)
+    return ReplayedEvents(
+        table[..., :2].astype(np.int32),
+        shapes.index_into(shape_names)[table[..., 2:5]],
+        class_index[table[..., 5]],
+        class_index[outcome],
+        class_names,
+        shape_names,
+    )
+
+
+# Many runs meet in the same worlds.
+_class_of = lru_cache(maxsize=1 << 14)(class_name)
+
+
+def _touch_all(
+    world: SquareWorld, pairs: list[list[int]], kinds: list[int], event: int, last: int
+) -> None:
+    """Note what touches by a joining: its two blocks, and contacts that come right after it."""
+    world.touch(pairs[event])
+    event += 1
+    while event < last and kinds[event] == CLOSING:
+        world.touch(pairs[event])
+        event += 1
 
 
 def _follow_kinds(events: _Events, faces: FaceTable, shape: tuple[int, ...]) -> Integers:
@@ -182,21 +260,6 @@ def _follow_kinds(events: _Events, faces: FaceTable, shape: tuple[int, ...]) -> 
         _refuse(~holds, at, event, "joins two faces whose types do not latch")
         kind[pair] = became
     return kind
-
-
-class _Events(NamedTuple):
-    number: Integers
-    block: Integers
-    face: Integers
-    kind: Integers | None
-
-
-class _Lattice(NamedTuple):
-    """Where the blocks of many runs are: (run, block[, 2])."""
-
-    cell: Integers
-    quarter: Integers
-    assembly: Integers
 
 
 class _Names:
@@ -214,191 +277,19 @@ class _Names:
         return np.array([*(place[name] for name in self.known), -1], dtype=np.int32)
 
 
-class _Replay:
-    """The state of all runs while their events are applied."""
-
-    def __init__(
-        self, shape: tuple[int, ...], events: _Events, *, chirality: Chirality | None
-    ) -> None:
-        runs, blocks = shape
-        slots = events.block.shape[1]
-        self.bonds = None if events.kind is None else BondGraph(runs, blocks)
-        self.chirality = chirality
-        self.blocks = blocks
-        self.lattice = _Lattice(
-            np.zeros((runs, blocks, 2), dtype=np.int64),
-            np.zeros((runs, blocks), dtype=np.int64),
-            np.tile(np.arange(blocks), (runs, 1)),
-        )
-        self.shapes, self.classes = _Names("1"), _Names(all_single(blocks))
-        # The number of the shape at the lowest block of each assembly, -1 at the other blocks.
-        self.shape_of = np.zeros((runs, blocks), dtype=np.int64)
-        self.event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)
-        self.event_shape = np.full((runs, slots, 3), -1, dtype=np.int32)
-        self.event_class = np.full((runs, slots), -1, dtype=np.int32)
-        self.outcome = np.zeros(runs, dtype=np.int32)
-
-    def apply(self, event: int, at: Integers, events: _Events) -> None:
-        """Apply the event of this number to the runs that have it."""
-        if self.bonds is None or events.kind is None:
-            self._join(event, at, events)
-            return
-        kind = events.kind[at, event]
-        _refuse((kind < JOINING) | (kind > CLOSING), at, event, "is of no kind")
-        for number, change in ((JOINING, self._join), (PARTING, self._part)):
-            if (kind == number).any():
-                change(event, at[kind == number], events)
-        for number in (JOINING, OPENING, CLOSING):
-            own = at[kind == number]
-            self.bonds.put(own, events.block[own, event], number != OPENING)
-        loop = at[kind >= OPENING]
-        labels = self.lattice.assembly[loop]
-        self.event_assembly[loop, event] = np.take_along_axis(
-            labels, events.block[loop, event], axis=1
-        )
-        self.event_class[loop, event] = self.outcome[loop]
-
-    def _join(self, event: int, at: Integers, events: _Events) -> None:
-        labels = self.lattice.assembly[at]
-        own = np.take_along_axis(labels, events.block[at, event], axis=1)
-        _refuse(own[:, 0] == own[:, 1], at, event, "joins two blocks of one assembly")
-        self.event_assembly[at, event] = own
-        self.event_shape[at, event, :2] = np.take_along_axis(self.shape_of[at], own, axis=1)
-        self._align(at, events.block[at, event], events.face[at, event])
-        low, high = own.min(axis=1), own.max(axis=1)
-        member = (labels == low[:, None]) | (labels == high[:, None])
-        self.lattice.assembly[at] = np.where(member, low[:, None], labels)
-        became = self._shape_numbers(at, event, member)
-        self.shape_of[at, high] = -1
-        self.shape_of[at, low] = became
-        self.event_shape[at, event, 2] = became
-        self.outcome[at] = self.event_class[at, event] = self._class_numbers(at)
-
-    def _part(self, event: int, at: Integers, events: _Events) -> None:
-        """Cut an assembly of each run where a bond of it breaks."""
-        if self.bonds is None:
-            return
-        block, labels = events.block[at, event], self.lattice.assembly[at]
-        own = np.take_along_axis(labels, block, axis=1)
-        self.bonds.put(at, block, False)
-        first = self.bonds.reached(at, block[:, 0])
-        whole = np.take_along_axis(first, block[:, 1:], axis=1)[:, 0] | (own[:, 0] != own[:, 1])
-        _refuse(whole, at, event, "parts two blocks that are not held by that bond alone")
-        self._separate(at, first)
-        self.event_shape[at, event, 2] = self.shape_of[at, own[:, 0]]
-        for side, member in enumerate((first, (labels == own[:, :1]) & ~first)):
-            lowest = member.argmax(axis=1)
-            self.lattice.assembly[at] = np.where(member, lowest[:, None], self.lattice.assembly[at])
-            shape = self._shape_numbers(at, event, member)
-            self.shape_of[at, lowest] = shape
-            self.event_assembly[at, event, side] = lowest
-            self.event_shape[at, event, side] = shape
-        self.outcome[at] = self.event_class[at, event] = self._class_numbers(at)
-
-    def _separate(self, at: Integers, side: Bools) -> None:
-        """Note that what is marked has parted from the others of the run."""
-
-    def result(self, events: _Events, end: _Lattice) -> ReplayedEvents:
-        """Apply all events, and return what they did; refuse those that lead elsewhere."""
-        for event in range(int(events.number.max(initial=0))):
-            self.apply(event, np.flatnonzero(events.number > event), events)
-        _check_end(self.lattice, end)
-        shapes = listed_shapes(self.shapes.known, self.blocks, chirality=self.chirality)
-        classes = listed_classes(self.classes.known, self.blocks, chirality=self.chirality)
-        shape_index, class_index = self.shapes.index_into(shapes), self.classes.index_into(classes)
-        return ReplayedEvents(
-            self.event_assembly,
-            shape_index[self.event_shape],
-            class_index[self.event_class],
-            class_index[self.outcome],
-            classes,
-            shapes,
-        )
-
-    def _align(self, at: Integers, block: Integers, face: Integers) -> None:
-        """Turn and shift the assemblies that move so that the two faces of each event coincide."""
-        cell, quarter, labels = (array[at] for array in self.lattice)
-        row = np.arange(at.size)
-        stays, moves = block.T
-        outward = (face[:, 0] + quarter[row, stays]) % 4
-        turn = outward + 2 - face[:, 1] - quarter[row, moves]
-        moved = labels == labels[row, moves][:, None]
-        arm = rotate(cell - cell[row, moves][:, None], turn[:, None])
-        there = arm + (cell[row, stays] + np.array(STEPS)[outward])[:, None]
-        self.lattice.cell[at] = np.where(moved[..., None], there, cell)
-        self.lattice.quarter[at] = np.where(moved, (quarter + turn[:, None]) % 4, quarter)
-
-    def _shape_numbers(self, at: Integers, event: int, member: Bools) -> Integers:
-        """Return the numbers of the shapes that the members of each run make up."""
-        cell, far = self.lattice.cell[at], 2 * self.blocks
-        lowest = np.where(member[..., None], cell, cell.max(initial=0) + 1).min(axis=1)
-        place = cell - lowest[:, None]
-        codes = np.where(member, place[..., 0] * far + place[..., 1], far * far)
-        codes.sort(axis=1)
-        twice = (np.diff(codes, axis=1) == 0) & (codes[:, 1:] < far * far)
-        _refuse(twice.any(axis=1), at, event, "puts two blocks into one cell")
-        codes, inverse = np.unique(codes, axis=0, return_inverse=True)
-        numbers = []
-        for row in codes:
-            cells = tuple(divmod(code, far) for code in row[row < far * far].tolist())
-            name = name_of(moved_to_origin(cells), self.chirality or "merged")
-            numbers.append(self.shapes.number(name))
-        return np.array(numbers, dtype=np.int64)[inverse.reshape(-1)]
-
-    def _class_numbers(self, at: Integers) -> npt.NDArray[np.int32]:
-        """Return the numbers of the outcome classes of the runs."""
-        present = np.sort(self.shape_of[at], axis=1)
-        worlds, inverse = np.unique(present, axis=0, return_inverse=True)
-        names = list(self.shapes.known)
-        numbers = [
-            self.classes.number(class_name(names[shape] for shape in row[row >= 0].tolist()))
-            for row in worlds
-        ]
-        return np.array(numbers, dtype=np.int32)[inverse.reshape(-1)]
+class _Events(NamedTuple):
+    number: Integers
+    block: Integers
+    face: Integers
+    kind: Integers | None
 
 
-class _DiscReplay(_Replay):
-    """The same of discs and rectangles, which stay as they lie."""
+class _Lattice(NamedTuple):
+    """Where the blocks of many runs are: (run, block[, 2])."""
 
-    def __init__(
-        self, pose: Floats, events: _Events, *, diameter: float, width: float | None
-    ) -> None:
-        super().__init__(pose.shape[:2], events, chirality=None)
-        self.noun = "discs" if width is None else "rectangles"
-        self.touch = np.array([touching(one, diameter=diameter, width=width) for one in pose])
-        if events.kind is not None:
-            self.touch[:] = False
-
-    def _join(self, event: int, at: Integers, events: _Events) -> None:
-        # Contacts that close with a joining are told after it.
-        now, own = event, at
-        while events.kind is not None and own.size:
-            first, second = events.block[own, now].T
-            self.touch[own, first, second] = self.touch[own, second, first] = True
-            now += 1
-            own = own[events.number[own] > now]
-            own = own[events.kind[own, now] == CLOSING] if own.size else own
-        super()._join(event, at, events)
-
-    def _separate(self, at: Integers, side: Bools) -> None:
-        self.touch[at] &= side[:, :, None] == side[:, None, :]
-
-    def _align(self, at: Integers, block: Integers, face: Integers) -> None:
-        pass
-
-    def _shape_numbers(self, at: Integers, event: int, member: Bools) -> Integers:  # noqa: ARG002
-        names = [
-            disc_shape(self.touch[run][np.ix_(own, own)], noun=self.noun)
-            for run, own in zip(at, member, strict=True)
-        ]
-        return np.array([self.shapes.number(name) for name in names], dtype=np.int64)
-
-
-def rotate(cell: Integers, turn: Integers) -> Integers:
-    """Turn cells (..., 2) by quarters (...) about the origin."""
-    x, y = cell[..., 0], cell[..., 1]
-    turns = [(x, y), (-y, x), (-x, -y), (y, -x)]
-    return np.stack([np.choose(turn % 4, [pair[axis] for pair in turns]) for axis in (0, 1)], -1)
+    cell: Integers
+    quarter: Integers
+    assembly: Integers
 
 
 def _whole(values: npt.ArrayLike) -> Integers:
@@ -426,7 +317,10 @@ def _check_arrays(events: _Events, end: _Lattice) -> None:
         run = int(np.argmax(wrong))
         raise InputError(f"run {run}: {events.number[run]} events among {blocks} blocks")
     real = np.arange(slots) < events.number[:, None]
-    for what, values, limit in (("block", events.block, blocks), ("face", events.face, 4)):
+    numbers = [("block", events.block, blocks), ("face", events.face, 4)]
+    if events.kind is not None:
+        numbers.append(("kind", events.kind[..., None], CLOSING + 1))
+    for what, values, limit in numbers:
         bad = real[..., None] & ((values < 0) | (values >= limit))
         if bad.any():
             run, event, side = map(int, np.argwhere(bad)[0])
@@ -438,18 +332,20 @@ def _check_end(replayed: _Lattice, end: _Lattice) -> None:
     differs = replayed.assembly != end.assembly
     if not differs.any():
         (cell, quarter), (end_cell, end_quarter) = _from_lowest(replayed), _from_lowest(end)
-        differs = (cell != end_cell).any(axis=2) | (quarter != end_quarter)
+        differs = (cell != end_cell) | (quarter != end_quarter)
     if differs.any():
         run, block = map(int, np.argwhere(differs)[0])
         raise InputError(f"run {run}: the events do not lead block {block} to where it is")
 
 
-def _from_lowest(lattice: _Lattice) -> tuple[Integers, Integers]:
-    """Return cells and quarters as seen from the lowest block of each assembly."""
-    lowest = lattice.assembly
-    origin = np.take_along_axis(lattice.cell, lowest[..., None], axis=1)
-    turned = np.take_along_axis(lattice.quarter, lowest, axis=1)
-    return rotate(lattice.cell - origin, -turned), (lattice.quarter - turned) % 4
+def _from_lowest(lattice: _Lattice) -> tuple[npt.NDArray[np.complex128], Integers]:
+    """Return cells, as x + iy, and quarters as seen from the lowest block of each assembly."""
+    cell = lattice.cell[..., 0] + 1j * lattice.cell[..., 1]
+    origin, turned = (
+        np.take_along_axis(one, lattice.assembly, axis=1) for one in (cell, lattice.quarter)
+    )
+    back = np.array([1, -1j, -1, 1j])[turned % 4]
+    return (cell - origin) * back, (lattice.quarter - turned) % 4
 
 
 def _refuse(wrong: Bools, at: Integers, event: int, what: str) -> None:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import Join
 from driftwalk.assembly.lattice.polyomino import Chirality, name_of, put_beside
-from driftwalk.assembly.outcomes.outcome_classes import class_name
-from driftwalk.schema.shapes import MOST_NAMED, Cell, counted_class, moved_to_origin
+from driftwalk.assembly.outcomes.outcome_classes import world_class
+from driftwalk.schema.shapes import Cell, moved_to_origin
 
 
 class Event(NamedTuple):
@@ -126,13 +125,6 @@ class Partition:
         self.labels = [low if label == high else label for label in self.labels]
         return low != high
 
-    def cut(self, side: list[int]) -> None:
-        """Part some blocks of an assembly from its others."""
-        others = [b for b in self.members(self.labels[side[0]]) if b not in side]
-        for part in (side, others):
-            for block in part:
-                self.labels[block] = min(part)
-
     def members(self, label: int) -> list[int]:
         """Return the blocks of an assembly."""
         return [block for block, own in enumerate(self.labels) if own == label]
@@ -169,33 +161,13 @@ class LatticeWorld:
             fits = self.join(join.blocks, join.faces)
             (self.accepted if fits else self.dropped).append(join)
 
-    @classmethod
-    def of(cls, state: dict[str, npt.NDArray[Any]]) -> LatticeWorld:
-        """Return the lattice of a world of the native core."""
-        labels = state["assembly"].tolist()
-        world = cls(len(labels))
-        world.partition, world.quarter = Partition(labels), state["quarter"].tolist()
-        world.cell = [(x, y) for x, y in state["cell"].tolist()]
-        return world
-
-    @property
-    def blocks(self) -> int:
-        """Number of blocks."""
-        return len(self.quarter)
-
     def shape(self, members: Sequence[int], chirality: Chirality) -> str:
         """Name the shape of some blocks of one assembly."""
         return name_of(moved_to_origin(tuple(self.cell[block] for block in members)), chirality)
 
     def outcome(self, chirality: Chirality, parts: Partition | None = None) -> str:
         """Name the outcome class of the blocks, parted as they are or as said."""
-        labels = (parts or self.partition).labels
-        if len(labels) > MOST_NAMED:
-            return counted_class(len(set(labels)))
-        members: dict[int, list[int]] = {}
-        for block, label in enumerate(labels):
-            members.setdefault(label, []).append(block)
-        return class_name(self.shape(blocks, chirality) for blocks in members.values())
+        return world_class(self.cell, (parts or self.partition).labels, chirality=chirality)
 
     def join(self, blocks: tuple[int, int], faces: tuple[int, int]) -> bool:
         """Join two faces; False when that contradicts the joins that there are."""

@@ -6,8 +6,7 @@ beyond a looser pair of tolerances for as long; both are dated back to the first
 noisy sample neither makes a join nor ends one.
 
 Blocks that drift past each other also fit for a while. Joined ones are one rigid body, so their
-faces keep their place to each other, and all joins of a recording lie alike. The graph of bonds
-says which blocks a bond that breaks leaves together.
+faces keep their place to each other, and all joins of a recording lie alike.
 
 The tables of typed faces are for the native core, and to follow the kinds of blocks.
 """
@@ -18,7 +17,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +25,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import ConfigurationError
-
-if TYPE_CHECKING:
-    from driftwalk.model import Assembly
+from driftwalk.model import Assembly
 
 QUARTER: Final = math.pi / 2
 """A turn from one face of a square block to the next [rad]."""
@@ -199,17 +196,16 @@ class PairPoses(NamedTuple):
 
 def _joins_of_pair(
     poses: Poses, blocks: tuple[int, int], both: Bools, rules: JoinRules
-) -> list[Join]:
+) -> Iterator[Join]:
     at = np.flatnonzero(both)
     pair = poses.pair(blocks, at)
     # The centres of blocks that fit are hardly farther apart than a side.
     if not (np.hypot(*pair.apart) <= rules.side + rules.join_distance).any():
-        return []
+        return
     nearest = pair.nearest_faces()
     distance, angle = pair.misfit(nearest, rules.side)
     fits = (distance <= rules.join_distance) & (angle <= rules.join_angle)
     kind = np.where(fits, 4 * nearest[0] + nearest[1], -1)
-    joins = []
     start = first_streak(pair.time, kind, 0, rules)
     while start is not None:
         faces = nearest[:, start]
@@ -217,17 +213,14 @@ def _joins_of_pair(
         beyond = (distance > rules.release_distance) | (angle > rules.release_angle)
         stop = first_streak(pair.time, np.where(beyond, 0, -1), start, rules)
         looseness = np.maximum(distance / rules.join_distance, angle / rules.join_angle)
-        joins.append(
-            Join(
-                blocks,
-                (int(faces[0]), int(faces[1])),
-                int(at[start]),
-                int(at[stop]) if stop is not None else len(poses.time),
-                float(np.median(looseness[start:stop])),
-            )
+        yield Join(
+            blocks,
+            (int(faces[0]), int(faces[1])),
+            int(at[start]),
+            int(at[stop]) if stop is not None else len(poses.time),
+            float(np.median(looseness[start:stop])),
         )
         start = None if stop is None else first_streak(pair.time, kind, stop, rules)
-    return joins
 
 
 def first_streak(time: Floats, kind: Integers, begin: int, rules: JoinRules) -> int | None:
@@ -429,8 +422,7 @@ def rigid_joins(
 
 
 def _size(lie: Floats) -> Floats:
-    size: Floats = np.sqrt((lie**2).sum(axis=0))
-    return size
+    return np.asarray(np.sqrt((lie**2).sum(axis=0)))
 
 
 def _stretches(contact: Contact, rules: JoinRules, play: float) -> Iterator[Stretch]:
@@ -484,31 +476,3 @@ OPENING: Final = 2
 """A bond of a loop broke; the loop holds its blocks together."""
 CLOSING: Final = 3
 """A bond of a loop formed, of neighbours that a joining has brought together."""
-
-
-class BondGraph:
-    """Bonds between the blocks of runs, side by side.
-
-    Parameters
-    ----------
-    runs, blocks : int
-        At first there is no bond.
-    """
-
-    def __init__(self, runs: int, blocks: int) -> None:
-        self.bonded: Bools = np.zeros((runs, blocks, blocks), dtype=bool)
-
-    def put(self, run: Integers, block: Integers, bonded: bool) -> None:
-        """Make or break the bonds of pairs of blocks (n, 2), one for each of some runs."""
-        first, second = block.T
-        self.bonded[run, first, second] = self.bonded[run, second, first] = bonded
-
-    def reached(self, run: Integers, block: Integers) -> Bools:
-        """Return which blocks bonds lead to from one block of each run, shape (n, blocks)."""
-        bonded = self.bonded[run]
-        found: Bools = np.arange(bonded.shape[1]) == block[:, None]
-        while True:
-            grown = found | (bonded & found[:, :, None]).any(axis=1)
-            if (grown == found).all():
-                return found
-            found = grown

@@ -51,7 +51,9 @@ class Emulator(NamedTuple):
     solved: Floats
     """Inverse covariance times what the nodes say, shape (category, node)."""
 
+    # Small matrices: more threads would mostly wait for each other.
     @classmethod
+    @one_blas_thread()
     def fitted(cls, node: Floats, count: Integers) -> Self:
         """Return the emulator of the counts of nodes, by the largest posterior of its scales.
 
@@ -62,27 +64,19 @@ class Emulator(NamedTuple):
         count : ndarray of int, shape (nodes, categories)
             Simulated runs of each category.
         """
-        # Small matrices: more threads would mostly wait for each other.
-        with one_blas_thread():
-            return cls._fitted(node, count)
-
-    @classmethod
-    def _fitted(cls, node: Floats, count: Integers) -> Self:
         from scipy.linalg import cho_solve
         from scipy.special import digamma, polygamma
 
         filled = count + EMULATOR_POLICY.pseudo_count
         said, noise = digamma(filled), polygamma(1, filled)
-        length, variance, factor, solved = [], [], [], []
+        rows = []
         for k in range(count.shape[1]):
             scales = _fitted_scales(node, said[:, k], noise[:, k])
             covariance = _kernel(node, node, scales) + np.diag(noise[:, k])
             root = np.linalg.cholesky(covariance)
-            length.append(np.exp(scales[1:]))
-            variance.append(np.exp(scales[0]))
-            factor.append(root)
-            solved.append(cho_solve((root, True), said[:, k]))
-        return cls(node, *map(np.array, (length, variance, factor, solved)))
+            solved = cho_solve((root, True), said[:, k])
+            rows.append((np.exp(scales[1:]), np.exp(scales[0]), root, solved))
+        return cls(node, *map(np.array, zip(*rows, strict=True)))
 
     def predict(self, point: Floats) -> tuple[Floats, Floats]:
         """Return mean and variance of the logarithms at points, shape (point, category) each."""
@@ -127,8 +121,7 @@ def _fitted_scales(node: Floats, said: Floats, noise: Floats) -> Floats:
 
     start = np.r_[np.log(max(said.var(), 0.1)), np.full(node.shape[1], np.log(policy.length))]
     bounds = [(-7.0, 7.0), *[(np.log(0.03), np.log(20.0))] * node.shape[1]]
-    best: Floats = minimize(loss, start, method="L-BFGS-B", bounds=bounds).x
-    return best
+    return np.asarray(minimize(loss, start, method="L-BFGS-B", bounds=bounds).x)
 
 
 def log_likelihoods(mean: Floats, variance: Floats, count: Integers, *, seed: int = 0) -> Floats:

@@ -43,6 +43,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.progress import ignore_progress
 from driftwalk.core.study_keys import INFERRED_KEYS
 from driftwalk.core.units import in_percent
+from driftwalk.model import Study, declared
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.answers.outcome_posterior import (
     BOTH_ENDS,
@@ -59,7 +60,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
-    from driftwalk.model import Study
     from driftwalk.sweep import Store
 
 Progress = Callable[[int, int], None]
@@ -329,7 +329,8 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
         verdict = "cannot tell: no kind of data has regions that cover"
     elif not (limit == BOTH_ENDS).all():
         verdict = "partly determined" if (limit != NO_END).any() else "cannot tell"
-    kinds = list(KINDS)
+    checks = (coverage[kind] for kind in KINDS)
+    power, joint, marginal, width = (np.array(one) for one in zip(*checks, strict=True))
     data: dict[str, Any] = {
         "value": (("point", "parameter"), value),
         "weight": ("point", weight),
@@ -339,27 +340,23 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
         "limit": ("parameter", limit.astype(object)),
         "low": ("parameter", low),
         "high": ("parameter", problem.high),
-        "observed": ("data", np.array([kind in problem.kinds for kind in kinds])),
-        "offered": ("data", np.array([coverage[kind].offered for kind in kinds])),
-        "power": ("data", np.array([coverage[kind].power for kind in kinds])),
-        "coverage": ("data", np.array([coverage[kind].joint for kind in kinds])),
-        "interval_coverage": (
-            ("data", "parameter"), np.stack([coverage[kind].marginal for kind in kinds])
-        ),
-        "expected_width": (
-            ("data", "parameter"), np.stack([coverage[kind].width for kind in kinds])
-        ),
+        "observed": ("data", np.isin(KINDS, problem.kinds)),
+        "offered": ("data", np.isfinite(power)),
+        "power": ("data", power),
+        "coverage": ("data", joint),
+        "interval_coverage": (("data", "parameter"), marginal),
+        "expected_width": (("data", "parameter"), width),
         "width": (("data", "parameter"), (bounds[..., 2] - bounds[..., 0]) / policy.confidence),
         "count": ("class", observed),
         "share": ("class", predicted),
         "node_value": (("node", "parameter"), low + emulated.node * span),
         "truth_value": (("truth", "parameter"), low + checked.truth * span),
         "reason": ("reason", texts(reasons)),
-    }  # fmt: skip
+    }
     coords = {
         "parameter": ("parameter", np.array(problem.names, dtype=object)),
         "unit": ("parameter", np.array(unit, dtype=object)),
-        "data": ("data", np.array(kinds, dtype=object)),
+        "data": ("data", np.array(KINDS, dtype=object)),
         "class": ("class", np.array(names, dtype=object)),
     }
     attrs = {
@@ -392,8 +389,6 @@ def _classes(
 
 
 def _unit(name: str) -> str:
-    from driftwalk.model import declared
-
     quantity = declared(INFERRED_KEYS[name]).quantity
     return "1" if quantity is None else quantity.unit
 
@@ -426,18 +421,16 @@ def _reasons(
     """Return sentences for what is not determined, and why; `poor_fit`: where the model fails."""
     policy, found = CREDIBLE_REGION, []
     if not checked.explained:
-        found.append(
+        return [
             f"the outcomes agree with no setting of the ranges (p = {checked.p:.2g}): {poor_fit}"
-        )
-        return found
+        ]
     if used is None:
         lacking = ", ".join(
             f"for {kind} they hold {in_percent(min(one.joint, *one.marginal))}"
             for kind, one in checked.coverage.items()
             if kind in problem.kinds
         )
-        found.append(f"regions do not cover in the self-check ({lacking}): use narrower ranges")
-        return found
+        return [f"regions do not cover in the self-check ({lacking}): use narrower ranges"]
     for name, side, (low, _, high) in zip(problem.names, limit, bounds, strict=True):
         words = axis_number(name).plain
         if side == NO_END:

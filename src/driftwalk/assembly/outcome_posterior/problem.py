@@ -6,8 +6,7 @@ others.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -44,13 +43,12 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.study_keys import INFERRED_KEYS, INFERRED_RANGES
+from driftwalk.model import Study, apply_overrides
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.sweep import Store, WorkUnit, grid, settings_per_unit
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from driftwalk.model import Study
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,32 +107,22 @@ class Nodes:
         InputError
             When the blocks of a node have no room, or its flow does not cover the tank.
         """
-        from driftwalk.model import apply_overrides
-
         value = self.value[rows.start : rows.stop]
         column = dict(zip(self.names, value.T, strict=True))
         apart = {
             INFERRED_KEYS[name]: column[name] for name in self.names if name not in OF_EACH_RUN
         }
-        studies = [self.study]
-        if apart:
-            studies = [
-                apply_overrides(self.study, {key: float(row[at]) for key, row in apart.items()})
-                for at in range(len(value))
-            ]
+        studies = [
+            apply_overrides(self.study, {key: float(row[at]) for key, row in apart.items()})
+            for at in range(len(value) if apart else 1)
+        ]
         worlds = [world_plan(one, self.flow, threads=self.threads) for one in studies]
-        world = np.arange(len(value)) if apart else np.zeros(len(value), dtype=np.int64)
+        world = np.arange(len(value)) % len(worlds)
         along = {name: column[name] for name in self.names if name in OF_EACH_RUN}
         return make_settings(worlds, world, first_trial=self.first_trial + rows.start, **along)
 
-    def simulate(
-        self,
-        *,
-        store: Store | None = None,
-        progress: Callable[[int, int], None] | None = None,
-        executor: Executor | None = None,
-    ) -> list[list[Record]]:
-        """Simulate all nodes, skipping what a store holds already.
+    def simulate(self, store: Store | None = None, **how: Any) -> list[list[Record]]:
+        """Simulate all nodes, `how` as for `run_sweep`, skipping what a store holds already.
 
         Raises
         ------
@@ -145,7 +133,7 @@ class Nodes:
         steps = self.study.sensitivity.runs * assembly.duration_s / self.study.time_step_s
         nodes = len(self.value)
         units = grid(node=np.arange(nodes)).units(settings_per_unit(nodes, steps * assembly.blocks))
-        found = sweep_texts(self, units, store=store, progress=progress, executor=executor)
+        found = sweep_texts(self, units, store=store, **how)
         records = [records_from_text(text) for text in found["records"].tolist()]
         if not all(records):
             raise InputError("all runs of a node broke down: use a smaller time step")
@@ -216,8 +204,6 @@ class OutcomeProblem:
 
     def nodes(self, point: Floats, first_trial: int, runs: int | None = None) -> Nodes:
         """Return simulations at points of the unit cube."""
-        from driftwalk.model import apply_overrides
-
         study = self.study
         if runs is not None:
             study = apply_overrides(study, {"sensitivity.runs": runs})
@@ -263,8 +249,6 @@ def check_outcomes(
     """
     import xarray as xr
 
-    from driftwalk.model import Study, apply_overrides
-
     given: Any = [outcomes] if isinstance(outcomes, xr.Dataset) else outcomes
     chosen = Study() if study is None else study
     observed = observed_of(given, after=after, breaks=chosen.assembly.bonds_break)
@@ -294,8 +278,6 @@ def _ranges(
     vary: Mapping[str, tuple[float, float]], study: Study
 ) -> tuple[tuple[str, ...], Floats, Floats]:
     """Return names and ranges of the parameters."""
-    from driftwalk.model import apply_overrides
-
     for name, ends in vary.items():
         if name not in INFERRED_KEYS:
             raise InputError(f"vary: there is no '{name}'; choose from {', '.join(INFERRED_KEYS)}")

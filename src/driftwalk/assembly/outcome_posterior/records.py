@@ -13,7 +13,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.assembly.chains.histories import Histories, blocks_of, histories
+from driftwalk.assembly.chains.histories import (
+    Histories,
+    blocks_of,
+    histories,
+    merged_history,
+)
 from driftwalk.assembly.outcomes.distribution import is_complete
 from driftwalk.assembly.outcomes.outcome_classes import class_name, class_shapes, merge_chirality
 from driftwalk.assembly.runs.dataset import DECIMALS
@@ -124,15 +129,14 @@ def records_of_events(
     for at, names in zip(time, became, strict=True):
         real = np.isfinite(at)
         passed = [start, *(classes[k] for k in names[real])]
-        entry = [0.0, *at[real].tolist()]
-        changed = [0, *(k for k in range(1, len(passed)) if passed[k] != passed[k - 1])]
-        found.append(record_of([passed[k] for k in changed], [entry[k] for k in changed], end))
+        changed, entry = merged_history(passed, np.append(0.0, at[real]))
+        found.append(record_of(changed, entry.tolist(), end))
     return found
 
 
 def records_to_text(records: Sequence[Record]) -> str:
     """Return records as text."""
-    return json.dumps([[*one[:1], one.completion, one.joins, one.early] for one in records])
+    return json.dumps(records)
 
 
 def records_from_text(text: str) -> list[Record]:

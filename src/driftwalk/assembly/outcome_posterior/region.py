@@ -36,10 +36,8 @@ CREDIBLE_REGION = CredibleRegionPolicy()
 
 def weights_of(log_likelihood: Floats, *, power: float = 1.0) -> Floats:
     """Return posterior weights of a sample of the prior, shape (..., point)."""
-    level = power * (log_likelihood - log_likelihood.max(axis=-1, keepdims=True))
-    weight = np.exp(level)
-    found: Floats = weight / weight.sum(axis=-1, keepdims=True)
-    return found
+    weight = np.exp(power * (log_likelihood - log_likelihood.max(axis=-1, keepdims=True)))
+    return np.asarray(weight / weight.sum(axis=-1, keepdims=True))
 
 
 def quantiles_of(point: Floats, weight: Floats, at: Floats) -> Floats:

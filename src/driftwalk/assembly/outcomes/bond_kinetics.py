@@ -193,12 +193,9 @@ def recorded_rates(
             clustering(one, time, confidence=RATE_CONFIDENCE) if kind == "joining" else 1.0
             for one, time in zip(moments, clock[-1], strict=True)
         ]
+        counts = [len(one) for one in moments]
         data |= rate_variables(
-            kind,
-            [len(one) for one in moments],
-            clock[-1],
-            confidence=RATE_CONFIDENCE,
-            clusters=clusters,
+            kind, counts, clock[-1], confidence=RATE_CONFIDENCE, clusters=clusters
         )
     return data
 

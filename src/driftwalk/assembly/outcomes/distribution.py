@@ -198,6 +198,13 @@ def copied_attrs(assembly: xr.Dataset) -> dict[str, Any]:
     return {key: value for key, value in assembly.attrs.items() if key not in NOT_COPIED}
 
 
+def attrs_of_runs(assembly: xr.Dataset, sound: Bools, confidence: float) -> dict[str, Any]:
+    """Return the same attributes, and how many of its runs had an outcome."""
+    runs = int(sound.sum())
+    counts = {"runs": runs, "left_out": sound.size - runs, "confidence": confidence}
+    return copied_attrs(assembly) | counts
+
+
 def at_times(
     event_time: Floats, course: npt.NDArray[Any], start: float, times: npt.NDArray[np.float64]
 ) -> npt.NDArray[Any]:

@@ -19,10 +19,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import combinations_with_replacement, groupby, product
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -39,8 +39,9 @@ from driftwalk.assembly.lattice.polyomino import (
     shape_order,
     shape_size,
 )
-from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.model import Study, parse_study
 from driftwalk.schema.check import require_kind
 from driftwalk.schema.shapes import (
     MOST_NAMED,
@@ -373,8 +374,6 @@ def kind_classes(assembly: xr.Dataset) -> dict[str, int]:
     >>> dw.assembly.kind_classes(found)
     {'1:A+1:B': 3}
     """
-    from driftwalk.model import parse_study
-
     require_kind(assembly, "assembly")
     if "kind" not in assembly:
         raise InputError(
@@ -458,8 +457,10 @@ def overlap_depth(
     return np.asarray((np.tile(reach, (2, 1)) - reached).min(axis=0))
 
 
-def touching(places: Floats, *, diameter: float, width: float | None = None) -> Bools:
-    """Return which bodies touch, if they are of one assembly, shape (n, n); each touches itself.
+def contact_pairs(
+    places: Floats, *, diameter: float, width: float | None = None
+) -> list[tuple[int, int]]:
+    """Return the pairs of bodies that touch, if they are of one assembly, the lower first.
 
     Parameters
     ----------
@@ -470,35 +471,21 @@ def touching(places: Floats, *, diameter: float, width: float | None = None) -> 
     width : float, optional
         Of a rectangle, along its own y [m]; default: discs.
     """
-    if width is None:
-        x, y = places[:, 0], places[:, 1]
-        apart = np.hypot(x[:, None] - x, y[:, None] - y)
-        return np.asarray(apart <= diameter * (1.0 + BODY_CONTACT.gap))
-    first, second = (index.ravel() for index in np.indices((len(places), len(places))))
-    depth = overlap_depth(places[first], places[second], side=diameter, width=width)
-    gap = BODY_CONTACT.gap * max(diameter, width)
-    return np.asarray(depth >= -gap).reshape(len(places), -1)
-
-
-def contact_pairs(
-    places: Floats, *, diameter: float, width: float | None = None
-) -> list[tuple[int, int]]:
-    """Return the pairs that touch, of many bodies; parameters as in `touching`."""
     from scipy.spatial import cKDTree
 
-    gap = BODY_CONTACT.gap
+    # A broken world has lost some of its bodies.
+    seen = np.flatnonzero(np.isfinite(places).all(axis=1))
+    longest = max(diameter, width or 0.0)
+    # Beyond a diagonal and the gap, and rounding, none touch.
+    reach = math.hypot(diameter, width or 0.0) + 2.0 * BODY_CONTACT.gap * longest
+    pairs = seen[cKDTree(places[seen, :2]).query_pairs(reach, output_type="ndarray")]
+    first, second = places[pairs[:, 0]], places[pairs[:, 1]]
     if width is None:
-        return sorted(cKDTree(places[:, :2]).query_pairs(diameter * (1.0 + gap)))
-    reach = math.hypot(diameter, width) + math.sqrt(2.0) * gap * max(diameter, width)
-    pairs = cKDTree(places[:, :2]).query_pairs(reach, output_type="ndarray")
-    depth = overlap_depth(places[pairs[:, 0]], places[pairs[:, 1]], side=diameter, width=width)
-    return [(a, b) for a, b in pairs[depth >= -gap * max(diameter, width)].tolist()]
-
-
-def disc_shape(touch: Bools, *, noun: str = "discs") -> str:
-    """Return the name of an assembly from which of its bodies touch, shape (n, n)."""
-    contacts = [(a, b) for a, b in np.argwhere(np.triu(touch, 1)).tolist()]
-    return graph_name(len(touch), contacts, noun)
+        touch = np.hypot(*(second - first)[:, :2].T) <= diameter * (1.0 + BODY_CONTACT.gap)
+    else:
+        depth = overlap_depth(first, second, side=diameter, width=width)
+        touch = depth >= -BODY_CONTACT.gap * longest
+    return [(a, b) for a, b in pairs[touch].tolist()]
 
 
 def disc_class(
@@ -513,7 +500,7 @@ def disc_class(
     Parameters
     ----------
     places, diameter, width
-        As in `touching`.
+        As in `contact_pairs`.
     assembly : sequence of int, shape (n,)
         Which assembly each body belongs to: any label.
 
@@ -531,7 +518,20 @@ def disc_class(
     labels = np.asarray(assembly)
     if labels.size > MOST_NAMED:
         return counted_class(np.unique(labels).size)
-    touch = touching(places, diameter=diameter, width=width)
-    members = [np.flatnonzero(labels == label) for label in np.unique(labels)]
+    pairs = contact_pairs(places, diameter=diameter, width=width)
     noun = "discs" if width is None else "rectangles"
-    return class_name(disc_shape(touch[np.ix_(own, own)], noun=noun) for own in members)
+    shapes = []
+    for label in np.unique(labels):
+        own = np.flatnonzero(labels == label).tolist()
+        place = {body: index for index, body in enumerate(own)}
+        met = [(place[a], place[b]) for a, b in pairs if a in place and b in place]
+        shapes.append(graph_name(len(own), met, noun))
+    return class_name(shapes)
+
+
+def state_class(state: Mapping[str, npt.NDArray[Any]], study: Study) -> str:
+    """Name the outcome class of a world of the native core, by its lattice or by its contacts."""
+    if study.block.has_lattice:
+        chirality = study.assembly.chirality
+        return world_class(state["cell"], state["assembly"], chirality=chirality)
+    return disc_class(state["pose"], state["assembly"], **study.block.contact_size)

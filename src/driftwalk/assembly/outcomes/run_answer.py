@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from driftwalk.assembly.outcomes.distribution import outcome_distribution
@@ -74,12 +75,11 @@ def _difference(found: xr.Dataset, drawn: xr.Dataset | None) -> dict[str, float]
     if drawn is None:
         return {}
     pair = (found, drawn)
-    counts = [dict(zip(d["class"].values, d["count"].values, strict=True)) for d in pair]
     runs = [int(d.attrs["runs"]) for d in pair]
-    names = dict.fromkeys([*counts[0], *counts[1]])
-    pooled = {
-        str(name): float(sum(count.get(name, 0) for count in counts)) / sum(runs) for name in names
-    }
+    counts = Counter[str]()
+    for one in pair:
+        counts.update(dict(zip(one["class"].values, one["count"].values.tolist(), strict=True)))
+    pooled = {name: number / sum(runs) for name, number in counts.items()}
     floor = l1_noise_floor(pooled, *runs)
     return {
         "l1_distance": l1_distance(*pair),

@@ -15,7 +15,7 @@ from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
 from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.distribution import (
     at_times,
-    copied_attrs,
+    attrs_of_runs,
     duration,
     require_assembly,
     runs_with_outcome,
@@ -115,7 +115,9 @@ def assembly_sizes(
     share = np.add.reduceat(number * np.arange(1, blocks + 1), first - 1, axis=1) / blocks
     event_time = assembly["event_time"].values[sound]
     courses = _courses(event_time, size[event_shape], sign, time, blocks)
-    compact = _compactness_of_runs(event_time, event_shape, sign, shapes, size, time)
+    moments = np.append(time, np.inf)
+    compact = _compactness_of_runs(event_time, event_shape, sign, shapes, size, moments)
+    at_end = compact[:, -1:]
     data: dict[str, Any] = {}
     for name, dim, values, possible in (
         ("number", "size", grouped, (0.0, blocks / first)),
@@ -123,11 +125,9 @@ def assembly_sizes(
         ("mean_size", "time", courses[0], (1.0, blocks)),
         ("largest_share", "time", courses[1], (1.0 / blocks, 1.0)),
         ("free_share", "time", courses[2], (0.0, 1.0)),
-        ("compactness", "time", compact, (0.0, 1.0)),
+        ("compactness", "time", compact[:, :-1], (0.0, 1.0)),
     ):
         data |= with_limits(name, dim, *_over_runs(values, confidence, possible))
-    end = np.array([np.inf])
-    at_end = _compactness_of_runs(event_time, event_shape, sign, shapes, size, end)
     ends = _over_runs(at_end, confidence, (0.0, 1.0))
     names = ("compactness", "compactness_low", "compactness_high")
     attrs = {name: float(end[0]) for name, end in zip(names, ends, strict=True)}
@@ -136,12 +136,9 @@ def assembly_sizes(
         data,
         {"size": ("size", first), "size_to": ("size", last), "time": ("time", time)},
         {
-            **copied_attrs(assembly),
+            **attrs_of_runs(assembly, sound, confidence),
             **attrs,
             "compactness_runs": int(np.isfinite(at_end).sum()),
-            "runs": int(sound.sum()),
-            "left_out": int((~sound).sum()),
-            "confidence": confidence,
             "method": METHOD,
         },
     )
@@ -184,11 +181,8 @@ def _numbers_at_end(event_shape: Integers, sign: Integers, size: Integers, block
 
 def _groups(blocks: int) -> tuple[Integers, Integers]:
     """Return the first and the last size of each group: 1, 2, ..., 8, 9 to 16, 17 to 32, ..."""
-    first = list(range(1, min(blocks, MOST_BLOCKS) + 1))
-    reached = MOST_BLOCKS
-    while reached < blocks:
-        first.append(reached + 1)
-        reached *= 2
+    doubling = (MOST_BLOCKS * 2**k + 1 for k in range(blocks.bit_length()))
+    first = [start for start in (*range(1, MOST_BLOCKS + 1), *doubling) if start <= blocks]
     return np.array(first), np.array([*(start - 1 for start in first[1:]), blocks])
 
 

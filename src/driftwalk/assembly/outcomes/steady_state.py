@@ -13,8 +13,8 @@ import numpy as np
 from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING
 from driftwalk.assembly.outcomes.bond_kinetics import PARTS, clustering, rate_variables
 from driftwalk.assembly.outcomes.distribution import (
+    attrs_of_runs,
     class_names,
-    copied_attrs,
     duration,
     require_assembly,
     runs_with_outcome,
@@ -124,10 +124,7 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
         data | curves,
         {"class": ("class", np.array(names, dtype=object)), "age": ("age", age)},
         {
-            **copied_attrs(assembly),
-            "runs": runs,
-            "left_out": int((~sound).sum()),
-            "confidence": confidence,
+            **attrs_of_runs(assembly, sound, confidence),
             "method": METHOD,
             "from_s": begin,
             "steady_p": p,
@@ -167,16 +164,11 @@ def _stays(assembly: xr.Dataset, sound: Bools, start: int) -> _Stays:
 
 def _shares(stays: _Stays, edges: Floats, runs: int, classes: int) -> Floats:
     """Return the share of each class in each piece of time of each run, (run, piece, class)."""
-    pieces = edges.size - 1
-    shares = np.zeros((runs, pieces, classes))
-    for piece in range(pieces):
-        low, high = edges[piece], edges[piece + 1]
-        within = np.minimum(stays.begin + stays.lasts, high) - np.maximum(stays.begin, low)
-        np.add.at(
-            shares,
-            (stays.run, np.full_like(stays.run, piece), stays.state),
-            np.maximum(within, 0.0) / (high - low),
-        )
+    shares = np.zeros((runs, edges.size - 1, classes))
+    low, high, begin = edges[:-1], edges[1:], stays.begin[:, None]
+    within = np.minimum(begin + stays.lasts[:, None], high) - np.maximum(begin, low)
+    place: Any = stays.run, slice(None), stays.state
+    np.add.at(shares, place, np.maximum(within, 0.0) / (high - low))
     return shares
 
 
@@ -233,7 +225,6 @@ def _lifetimes(stays: _Stays, classes: int, confidence: float) -> tuple[Floats, 
         own = real & (stays.state == state)
         over = np.where(stays.ends_by[own] >= 0, stays.lasts[own], np.nan)
         found = survival_curve(over, stays.lasts[own], times=age, confidence=confidence)
-        curve[:, :, state] = found.survival, found.low, found.high
-        median[:, state] = found.median, found.median_low, found.median_high
+        curve[:, :, state], median[:, state] = found[:3], found[3:]
     curves = with_limits("survival", ("age", "class"), *curve)
     return age, curves | with_limits("lifetime_median", "class", *median)

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.outcomes.distribution import (
+    attrs_of_runs,
     check_times,
     class_names,
     duration,
@@ -117,29 +118,20 @@ def class_times(
     )
     limits = proportion_interval(count, runs, confidence=confidence)
     data = with_limits("proportion", ("time", "class"), count / runs, *limits)
-    attrs: dict[str, Any] = {}
+    attrs = attrs_of_runs(assembly, sound, confidence)
     end_time = assembly["end_time"].values[sound]
     for event in EVENTS:
         curve = survival_curve(
             assembly[f"{event}_time"].values[sound], end_time, times=time, confidence=confidence
         )
-        data |= with_limits(event, "time", curve.survival, curve.low, curve.high)
-        attrs |= {
-            f"{event}_median_s": curve.median,
-            f"{event}_median_low_s": curve.median_low,
-            f"{event}_median_high_s": curve.median_high,
-        }
+        data |= with_limits(event, "time", *curve[:3])
+        medians = (f"{event}_median{end}_s" for end in ("", "_low", "_high"))
+        attrs |= dict(zip(medians, curve[3:], strict=True))
     return build_dataset(
         "class_times",
         data,
         {"time": ("time", time), "class": ("class", np.array(names, dtype=object))},
-        {
-            **assembly.attrs,
-            **attrs,
-            "runs": runs,
-            "left_out": int((~sound).sum()),
-            "confidence": confidence,
-        },
+        attrs,
     )
 
 

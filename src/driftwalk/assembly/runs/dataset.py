@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.events import replay_contacts, replay_events
+from driftwalk.assembly.lattice.events import ReplayedEvents, replay_contacts, replay_events
 from driftwalk.assembly.lattice.joined_faces import JOINING, PARTING, face_table
-from driftwalk.assembly.lattice.many_blocks import ReplayedEvents
-from driftwalk.assembly.runs.start import bond_attrs, glued_cells
+from driftwalk.assembly.runs.start import glued_cells
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
@@ -39,6 +38,12 @@ LAW_NAMES: Final = {
     "forces.stirring_length_m": "stirring_length",
 }
 """Names of drawn numbers of the law, by their keys in the study."""
+_RULES: Final = (
+    *("blocks", "runs", "seed", "chirality", "latching", "block_restitution", "block_friction"),
+)
+_CONNECTOR: Final = ("connector_distance_m", "connector_axis_rad", "connector_rotation_rad")
+_BONDS: Final = ("bond_rate_per_s", "bond_force_N", "bond_strength_N", "relatch_clearance")
+"""Keys of [assembly] that are attributes of the same names."""
 _SIZE: Final = ("block_shape", "block_side_m", "block_width_m")
 """Attributes that a recording of a run has too."""
 DECIMALS: Final = 9
@@ -172,31 +177,20 @@ def _poles(plan: Plan) -> dict[str, Any]:
 def assembly_attrs(plan: Plan) -> dict[str, Any]:
     """Return the attributes that say what was simulated."""
     study = plan.study
-    settings, forces = study.assembly, study.forces
-    connector = {
-        "connector_distance_m": settings.connector_distance_m,
-        "connector_axis_rad": settings.connector_axis_rad,
-        "connector_rotation_rad": settings.connector_rotation_rad,
-    }
+    settings = study.assembly
+    names = [*_RULES, *(_CONNECTOR if settings.latching == "connector" else ())]
+    names += _BONDS if settings.bonds_break else ()
     return {
-        "blocks": settings.blocks,
-        "runs": settings.runs,
+        **{name: getattr(settings, name) for name in names},
         "duration_s": float(np.round(plan.duration, DECIMALS)),
-        "seed": settings.seed,
-        "chirality": settings.chirality,
-        "latching": settings.latching,
-        **(connector if settings.latching == "connector" else {}),
         **({} if (faces := settings.typed_faces) is None else {"faces": faces.words}),
         "hidden_face_drag": "full" if not plan.has_lattice else str(settings.hidden_face_drag),
-        "block_restitution": settings.block_restitution,
-        "block_friction": settings.block_friction,
-        **bond_attrs(study),
         "block_side_m": study.block.side_m,
         **({} if plan.has_lattice else {"block_shape": study.block.shape}),
         **({} if (width := study.block.width_m) is None else {"block_width_m": width}),
         **({"glued": settings.glued} if glued_cells(settings) is not None else {}),
         "arena": study.tank.to_arena_json(),
-        "force_interval_s": forces.force_interval_s,
+        "force_interval_s": study.forces.force_interval_s,
         "time_step_s": study.time_step_s,
         "trial": plan.trial,
         "backend": plan.backend,
@@ -274,15 +268,10 @@ def path_recording(path: xr.Dataset, *, run: int = 0) -> xr.Dataset:
     if run not in runs:
         raise InputError(f"there is no run {run}: the path holds {', '.join(map(str, runs))}")
     one = path.sel(run=run)
-    x, y, theta = (
-        np.asarray(one[name].transpose("time", "block").values, dtype=np.float64)
-        for name in ("x", "y", "theta")
-    )
+    placed = one.transpose("time", "block", ...)
     return build_trajectory(
         one["time"].values,
-        x,
-        y,
-        theta,
+        *(placed[name].values.astype(np.float64) for name in POSE),
         body=[str(block) for block in one["block"].values],
         attrs={
             "source": f"simulated run {run}",

@@ -155,13 +155,9 @@ def _region_of(calibration: xr.Dataset) -> _Region:
     confidence = float(calibration["confidence"])
     # A surface that stays below the level on all its settings still has a border: its own end.
     rise = np.clip((surface - low) / max(level - low, np.finfo(np.float64).tiny), 0.0, 1.0)
-    border = np.column_stack(
-        [calibration[f"region_{name}"].values for name in ("drag_coefficient", "force_std")]
-    )
-    across, along = (
-        calibration[f"refined_{name}"].values.astype(np.float64)
-        for name in ("drag_coefficient", "force_std")
-    )
+    names = ("drag_coefficient", "force_std")
+    border = np.column_stack([calibration[f"region_{name}"].values for name in names])
+    across, along = (calibration[f"refined_{name}"].values.astype(np.float64) for name in names)
     return _Region(border, (across, along), (1.0 - confidence) ** rise)
 
 

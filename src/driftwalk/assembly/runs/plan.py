@@ -26,6 +26,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import default_threads
 from driftwalk.core.random_streams import trial_in, world_keys
+from driftwalk.model import Study, apply_overrides
 from driftwalk.simulation.backend import Camera, native_model, require_cover, require_steps
 from driftwalk.simulation.series import continued_flow, flow_starts
 
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 
     from driftwalk.assembly.lattice.polyomino import Chirality
     from driftwalk.assembly.pull.measured import MeasuredAttraction
-    from driftwalk.model import Study
 
 Backend = Literal["cpu", "reference"]
 
@@ -156,8 +156,6 @@ def make_plan(
         When an option is out of range, the blocks have no room or are not as many as their kinds
         count, the flow does not cover the tank, or is over before the runs.
     """
-    from driftwalk.model import apply_overrides
-
     if backend not in get_args(Backend):
         raise InputError(f"backend must be one of {', '.join(get_args(Backend))}, got {backend!r}")
     if not 0 <= trial < 2**40:

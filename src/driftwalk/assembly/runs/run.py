@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -28,12 +28,12 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.progress import Progress
+from driftwalk.model import Study, apply_overrides
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, settings_per_unit, threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
 
 FlowDraws = Literal["standard_error", "none"]
 
@@ -125,7 +125,7 @@ def assemble(
         threads=threads_of_unit(threads, executor),
         backend=backend,
     )
-    return _run(plan, start, store=store, progress=progress, executor=executor, drawn="no")
+    return _run(plan, start, "no", store=store, progress=progress, executor=executor)
 
 
 def assemble_drawn(
@@ -218,9 +218,7 @@ def assemble_drawn(
     )
     what = ["drag_coefficient", "force_std", *(LAW_NAMES[key] for key in law)]
     what += ["flow"] if moves else []
-    return _run(
-        plan, start, store=store, progress=progress, executor=executor, drawn=" ".join(what)
-    )
+    return _run(plan, start, " ".join(what), store=store, progress=progress, executor=executor)
 
 
 def assembly_path(
@@ -324,20 +322,12 @@ def _knot_distance(fit: xr.Dataset, flow: xr.Dataset) -> float | None:
     return stretched * float(fit["spline_spacing"]) if own else None
 
 
-def _run(
-    plan: Plan,
-    start: npt.ArrayLike | None,
-    *,
-    store: Store | None,
-    progress: Progress | None,
-    executor: Executor | None,
-    drawn: str,
-) -> xr.Dataset:
-    """Simulate the runs unit by unit, and put them into one dataset."""
+def _run(plan: Plan, start: npt.ArrayLike | None, drawn: str, **how: Any) -> xr.Dataset:
+    """Simulate the runs unit by unit, `how` as for `run_sweep`, and put them into one dataset."""
     units = grid(run=plan.index).units(runs_per_unit(plan))
     poses = start_poses(plan, start)
     function = partial(_simulate_unit, plan, poses)
-    arrays = run_sweep(function, units, store=store, executor=executor, progress=progress)
+    arrays = run_sweep(function, units, **how)
     if plan.study.assembly.bonds_break:
         arrays = _all_events(plan, poses, arrays)
     return build_assembly(plan, arrays, attrs={"drawn": drawn})
@@ -376,18 +366,13 @@ def _by_draw(plan: Plan, first: int, last: int) -> Sequence[tuple[slice, Plan]]:
     """Return the rows of a unit that share a flow and a force law, and their plan."""
     if plan.flow_draw is None and not plan.law:
         return [(slice(first, last), plan)]
-    draws = np.arange(first, last) // RUNS_PER_FLOW
-    edges = [0, *(np.flatnonzero(np.diff(draws)) + 1).tolist(), draws.size]
-    return [
-        (slice(first + low, first + high), _drawn(plan, first + low))
-        for low, high in pairwise(edges)
-    ]
+    following = first - first % RUNS_PER_FLOW + RUNS_PER_FLOW
+    edges = [first, *range(following, last, RUNS_PER_FLOW), last]
+    return [(slice(low, high), _drawn(plan, low)) for low, high in pairwise(edges)]
 
 
 def _drawn(plan: Plan, row: int) -> Plan:
     """Return the plan with the drawn flow and the drawn force law of a row."""
-    from driftwalk.model import apply_overrides
-
     law = {key: float(values[row]) for key, values in plan.law.items()}
     study, flow = apply_overrides(plan.study, law) if law else plan.study, plan.flow
     if plan.flow_draw is not None:

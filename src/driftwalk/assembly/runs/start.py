@@ -7,7 +7,6 @@ and the number of events of a run is limited.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,11 +16,9 @@ from driftwalk.assembly.outcomes.outcome_classes import overlap_depth
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
+from driftwalk.model import Assembly, Study, Tank
 from driftwalk.schema.shapes import STEPS, cells_of_shape
 from driftwalk.simulation.backend import wall_depth
-
-if TYPE_CHECKING:
-    from driftwalk.model import Assembly, Study, Tank
 
 
 def require_bonds(study: Study) -> None:
@@ -55,15 +52,6 @@ def require_bonds(study: Study) -> None:
             "glued blocks (`assembly.glued`) never part: let them start alone, or leave the bonds "
             "permanent (`assembly.bond_rate_per_s` of 0)"
         )
-
-
-def bond_attrs(study: Study) -> dict[str, Any]:
-    """Return the attributes that say how bonds break; none where they are permanent."""
-    rules = study.assembly
-    if not rules.bonds_break:
-        return {}
-    names = ("bond_rate_per_s", "bond_force_N", "bond_strength_N", "relatch_clearance")
-    return {name: float(getattr(rules, name)) for name in names}
 
 
 def with_event_rows(arrays: Arrays, rows: int) -> Arrays:
@@ -105,16 +93,13 @@ def with_glue_events(found: Arrays, cells: npt.NDArray[np.int32] | None, blocks:
         return found
     order = [(int(x), int(y)) for x, y in cells]
     joins = [(*parent, k) for k in range(1, len(order)) if (parent := _parent(order[:k], order[k]))]
-    ends = [
-        (first + parent, first + block, face)
-        for first in range(0, blocks, len(order))
-        for parent, face, block in joins
-    ]
-    block = np.array([[parent, child] for parent, child, _ in ends])
-    face = np.array([[one, (one + 2) % 4] for *_, one in ends])
-    before = {"event_step": np.zeros(len(ends)), "event_block": block, "event_face": face}
+    parent, side, child = np.array(joins).T
+    first = np.arange(0, blocks, len(order))[:, None, None]
+    block = (first + np.column_stack([parent, child])).reshape(-1, 2)
+    face = np.tile(np.column_stack([side, (side + 2) % 4]), (len(first), 1))
+    before = {"event_step": np.zeros(len(block)), "event_block": block, "event_face": face}
     runs, rows = found["event_step"].shape
-    made = {"event_count": found["event_count"] + np.int32(len(ends))}
+    made = {"event_count": found["event_count"] + np.int32(len(block))}
     for name, values in before.items():
         whole = np.broadcast_to(values.astype(np.int32), (runs, *values.shape))
         made[name] = np.concatenate([whole, found[name]], axis=1)[:, :rows]

@@ -28,7 +28,7 @@ from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.files.shards import Arrays
 from driftwalk.schema.shapes import all_single
 from driftwalk.simulation.backend import BROKEN
-from driftwalk.sweep import MemoryStore, Store, WorkUnit, grid, run_sweep, settings_per_unit
+from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, settings_per_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -104,19 +104,17 @@ class Arms:
     def settings(self, arms: Sequence[int], trial: int) -> Settings:
         """Return some arms as settings of one trial: they share their random numbers."""
         forces = self.axes.study.forces
+        usual = {"drag_coefficient": forces.drag_coefficient, "force_std": forces.force_std_N}
+        points = [usual | self.points[arm] for arm in arms]
+        drag, force = (np.array([float(one[name]) for one in points]) for name in OF_EACH_RUN)
         worlds = list({id(one): one for one in map(self.world, arms)}.values())
         return Settings(
             worlds,
             np.array([[one is self.world(arm) for one in worlds].index(True) for arm in arms]),
-            np.array(
-                [self._value(arm, "drag_coefficient", forces.drag_coefficient) for arm in arms]
-            ),
-            np.array([self._value(arm, "force_std", forces.force_std_N) for arm in arms]),
+            drag,
+            force,
             np.full(len(arms), trial),
         )
-
-    def _value(self, arm: int, name: str, default: float) -> float:
-        return float(self.points[arm].get(name, default))
 
 
 def reaches(name: str, target: str) -> bool:
@@ -192,9 +190,8 @@ class Runs:
         self._store, self._executor, self._progress = store, executor, progress
         self.times = kept_times(arms.axes.study)
         self._all_times = np.append(self.times, by)
-        self._runs: Counter[int] = Counter()
         self._counts: dict[int, Any] = {}
-        self.broken = self.done = self._calls = 0
+        self.broken = self._calls = 0
         self.tally = Tally(self.sample)
 
     def sample(self, arms: Sequence[int], runs: range) -> Bools:
@@ -203,32 +200,29 @@ class Runs:
         longest = max(w.steps * w.study.assembly.blocks for w in settings.worlds)
         size = settings_per_unit(len(arms) * len(runs), longest, multiple=RUNS_OF_UNIT)
         self._calls += 1
+        store = None
+        if self._store is not None:
+            points = [self.arms.points[arm] for arm in arms]
+            name = f"{self._name}_{self._calls:03d}"
+            store = self._store(name, {"settings": points, "runs": len(runs)})
         found = run_sweep(
             _Simulation(settings, self.target, self._all_times),
             grid(arm=np.arange(len(arms)), run=np.array(runs)).units(size),
-            store=self._own_store([self.arms.points[arm] for arm in arms], len(runs)),
-            progress=lambda done, _: self._progress(self.done + done),
+            store=store,
+            progress=lambda done, _: self._progress(self.tally.runs + done),
             executor=self._executor,
         )  # fmt: skip
         reached: Bools = found["reached"].reshape(len(arms), len(runs), -1)
         self.broken += int(found["broken"].sum())
-        self.done += len(arms) * len(runs)
         for arm, one in zip(arms, reached, strict=True):
             self._counts[arm] = self._counts.get(arm, 0) + one[:, :-1].sum(axis=0)
-            self._runs[arm] += len(runs)
         return reached[:, :, -1]
-
-    def _own_store(self, points: Sequence[Mapping[str, Any]], runs: int) -> Store:
-        if self._store is None:
-            return MemoryStore()
-        return self._store(f"{self._name}_{self._calls:03d}", {"settings": points, "runs": runs})
 
     def share(self, arm: int) -> Floats:
         """Return the share of the runs of an arm that have the target, over time."""
-        found: Floats = self._counts[arm] / self._runs[arm]
-        return found
+        return np.asarray(self._counts[arm] / self.tally.size(arm))
 
     def cautious(self, arm: int) -> Floats:
         """Return the share less its standard error, over time: few runs are no merit."""
-        share, runs = self.share(arm), self._runs[arm]
+        share, runs = self.share(arm), self.tally.size(arm)
         return share - np.sqrt((share * (1.0 - share) + 1.0 / runs) / runs)

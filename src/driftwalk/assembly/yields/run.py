@@ -171,7 +171,7 @@ def maximise_yield(
         tally, known, indifference=indifference, confidence=confidence,
         budget=HALVING.most * runs,
     )  # fmt: skip
-    before = chosen.done
+    before = tally.runs
     # A setting that was chosen for its runs was lucky in them: its yield comes from others.
     reported = Runs(arms, name, moment, trial=FIRST_TRIALS.fresh, name="fresh", **how)
     some = [selected.best, *selected.alike[: YIELD_POLICY.alike], *_front(chosen, known)]
@@ -255,9 +255,8 @@ def _prepared(
         vary_blocks="blocks" in arms.axes.values,
     )  # fmt: skip
     many = len(arms.points)
-    each = numbers[0] // (many * max(math.ceil(math.log2(many)), 1))
-    if each < HALVING.least_runs:
-        needed = HALVING.least_runs * many * max(math.ceil(math.log2(many)), 1)
+    needed = HALVING.least_runs * many * max(math.ceil(math.log2(many)), 1)
+    if numbers[0] < needed:
         raise InputError(
             f"{many} settings need at least {needed} runs, got {numbers[0]} (runs): give more runs "
             "or fewer values"

@@ -23,7 +23,8 @@ from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series, corrected
 from driftwalk.likelihood.preparation import Estimate
 from driftwalk.schema.trajectory import wrap_angle
-from driftwalk.simulation.backend import Camera, native_model, world_table
+from driftwalk.simulation.backend import Camera, native_model
+from driftwalk.simulation.initial import Start, world_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -239,15 +240,13 @@ def _propagated(
 ) -> tuple[list[Floats], list[Floats]]:
     """Return poses and rates of the particles one interval later."""
     shape = state[0].shape
-    names = ("x", "y", "theta", "vx", "vy", "omega")
+    start, forces = Start(*(part.ravel() for part in state)), study.forces
     worlds = world_table(
-        **{name: part.ravel() for name, part in zip(names, state, strict=True)},
-        drag_coefficient=np.full(keys.size, study.forces.drag_coefficient),
-        force_std=study.forces.force_std_N,
+        start, keys, drag_coefficient=forces.drag_coefficient, force_std=forces.force_std_N
     )
     found = _core.simulate(model, worlds, keys, threads=default_threads(), precision="single")
     pose, motion = [], []
-    for name, part in zip(names, found[:3], strict=False):
+    for name, part in zip(("x", "y", "theta"), found[:3], strict=True):
         now, then = part[:, 0].astype(np.float64), part[:, 1].astype(np.float64)
         change = wrap_angle(then - now) if name == "theta" else then - now
         pose.append(now.reshape(shape))

@@ -58,9 +58,10 @@ def test_a_map_is_what_simulating_and_comparing_each_setting_gives(problem):
     # The address of setting 2 of the coarse stage, replicate 1.
     key = world_keys(1, trial=(1 << 40) + 2, replicate=1)
     from driftwalk import _core
-    from driftwalk.simulation.backend import native_model, world_table
+    from driftwalk.simulation.backend import native_model
+    from driftwalk.simulation.initial import world_table
 
-    worlds = world_table(**problem.like.start._asdict(), drag_coefficient=0.5, force_std=4e-4)
+    worlds = world_table(problem.like.start, key, drag_coefficient=0.5, force_std=4e-4)
     native = native_model(model, problem.like.flow, problem.like.sample_time, problem.like.camera)
     x, y, _, _ = _core.simulate(native, worlds, key, threads=1, precision="single")
     steps = apply_steps(problem.reference.plan, x[0].astype(float), y[0].astype(float))
