@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model.section import Quantity, Section
+from driftwalk.model.section import Quantity, Section, without_unit
 from driftwalk.model.tank import FieldOfView
 
 
@@ -73,18 +73,6 @@ class Columns(Section):
     def to_dict(self) -> dict[str, str]:
         """Return the columns that are set, from quantity to column."""
         return self.model_dump(exclude_none=True)
-
-
-_ARGUMENTS: Final = {
-    "start_s": "start",
-    "stop_s": "stop",
-    "frame_rate_Hz": "frame_rate",
-    "max_speed_m_s": "max_speed",
-    "x_file": "x",
-    "y_file": "y",
-    "theta_file": "theta",
-}
-"""Arguments of `driftwalk.record.load` that have another name than their key."""
 
 
 class Recording(Section):
@@ -167,11 +155,12 @@ class Recording(Section):
     def load_options(self) -> dict[str, Any]:
         """Return the keyword arguments of `driftwalk.record.load` but for the arena.
 
-        Options that are not set are left out, so that the loader's own default applies.
+        Options that are not set are left out, so that the loader's own default applies. Its
+        arguments are called as the keys, without their units and without "_file".
         """
         stated = self.model_dump(exclude_none=True, exclude={"arena", "arena_center_m"})
         return {
-            _ARGUMENTS.get(key, key): value
+            without_unit(key).removesuffix("_file"): value
             for key, value in stated.items()
             if not (value == "auto" and self.is_default(key))
         }

@@ -14,25 +14,7 @@ from driftwalk.model.binding import faces_text
 from driftwalk.model.block import DragCoefficient, ForceStd
 from driftwalk.model.calibration import ForceGrid
 from driftwalk.model.interaction import MagnetText, parse_magnet
-from driftwalk.model.section import Quantity, Seed, distinct
-
-AXES: Final[dict[str, str]] = {
-    "tank_diameter": "tank_diameter_m",
-    "blocks": "blocks",
-    "flow": "flow",
-    "flow_scale": "flow_scale",
-    "glued": "glued",
-    "latching": "latching",
-    "faces": "faces",
-    "hidden_face_drag": "hidden_face_drag",
-    "stirring_length": "stirring_length_m",
-    "bond_rate": "bond_rate_per_s",
-    "magnets": "magnets",
-    "drag_coefficient": "drag_coefficient",
-    "force_std": "force_std_N",
-}
-"""From the name of an axis to the key of its list; the order is that of the dimensions."""
-LISTS: Final = tuple(AXES.values())
+from driftwalk.model.section import Quantity, Seed, distinct, is_list, without_unit
 
 
 class Sensitivity(ForceGrid):
@@ -111,10 +93,10 @@ class Sensitivity(ForceGrid):
     def _face_types(cls, values: tuple[str, ...] | None) -> tuple[str, ...] | None:
         return None if values is None else tuple(map(faces_text, values))
 
-    @field_validator(*LISTS)
+    @field_validator("*")
     @classmethod
-    def _distinct(cls, values: tuple[Any, ...] | None) -> tuple[Any, ...] | None:
-        return None if values is None else distinct(values)
+    def _distinct(cls, value: Any) -> Any:
+        return distinct(value) if isinstance(value, tuple) else value
 
     @field_validator("magnets")
     @classmethod
@@ -151,3 +133,9 @@ class Sensitivity(ForceGrid):
         """Values of each axis of the map: the lists, else the ranges of C_d and σ_F."""
         ranges = {"drag_coefficient": self.drag_coefficients, "force_std": self.force_stds_N}
         return self.lists or ranges
+
+
+AXES: Final[dict[str, str]] = {
+    without_unit(key): key for key in Sensitivity.model_fields if is_list(Sensitivity, key)
+}
+"""From the name of an axis to the key of its list; the order is that of the dimensions."""
