@@ -149,21 +149,19 @@ class MeasuredFlow:
         along = np.einsum("kab,kb->ka", self.normal, flow).ravel()
         return np.asarray(found - (k**2 / precision) * np.outer(along, along))
 
-    def stored(self) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-        """Return the variables, coordinates and attributes with which a fit holds it."""
+    def stored(self) -> tuple[dict[str, Any], dict[str, str]]:
+        """Return the variables and attributes with which a fit holds it."""
         on = ("measured_y", "measured_x")
-        data: dict[str, Any] = {
-            f"measured_{name}": (on, self.velocity[k]) for k, name in enumerate(NAMES)
-        }
-        data |= {f"measured_{name}_error": (on, self.error[k]) for k, name in enumerate(NAMES)}
-        coords = {"measured_y": ("measured_y", self.y), "measured_x": ("measured_x", self.x)}
+        data: dict[str, Any] = {"measured_y": (on[0], self.y), "measured_x": (on[1], self.x)}
         words = {"measured_flow": self.source, "measured_flow_errors": self.errors}
-        if self.amplitudes is not None:
+        for end, values in (("", self.velocity), ("_error", self.error)):
             for k, name in enumerate(NAMES):
-                for end, values in (("", self.velocity), ("_error", self.error)):
+                data[f"measured_{name}{end}"] = (on, values[k])
+                if self.amplitudes is not None:
                     data[f"measured_{name}_mode{end}"] = (("flow_mode", *on), values[k + 2 :: 2])
+        if self.amplitudes is not None:
             words["mode_repeat"] = self.amplitudes.repeat
-        return data, coords, words
+        return data, words
 
 
 def measured_flow(

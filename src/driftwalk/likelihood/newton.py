@@ -228,12 +228,11 @@ class ModeSearch:
     def find_from_afar(self, start: Point, weights: Weights) -> Mode | None:
         """Return the mode, of long recordings by way of the mode of pieces of them."""
         few = pieces(self.passes)
-        if few is not None:
-            near = self.of(few).coarse().find(start, weights)
-            if near is not None and near.converged:
-                mode = self.find(near.point, near.weights, held=FROM_ANOTHER)
-                if mode is not None and mode.converged:
-                    return mode
+        near = None if few is None else converged(self.of(few).coarse().find(start, weights))
+        if near is not None:
+            mode = converged(self.find(near.point, near.weights, held=FROM_ANOTHER))
+            if mode is not None:
+                return mode
         return self.find(start, weights)
 
 
@@ -242,6 +241,11 @@ def require_mode(mode: Mode | None) -> Mode:
     if mode is None:
         raise np.linalg.LinAlgError("the search broke down")
     return mode
+
+
+def converged(mode: Mode | None) -> Mode | None:
+    """Return a mode that is one; nothing where the search broke down or did not come to its end."""
+    return mode if mode is not None and mode.converged else None
 
 
 def _of_all(sums: Sums, count: int) -> Sums:

@@ -129,11 +129,12 @@ class PreparedRecordings:
         layers = 1 if self.measured is None else self.measured.layers
         return Passes(self.series, body, spline, len(self.intervals.labels), layers)
 
-    def undisturbed(self) -> list[Series]:
+    def undisturbed(self, interval: float = 0.0) -> list[Series]:
         """Return the series without what near the wall, or after a mistake, is no free motion.
 
         Left out as well are intervals with a corner within half a side of the wall, and those next
-        to a gap: a sample or a frame that is missing may be a mistake of its own.
+        to a gap: a sample or a frame that is missing may be a mistake of its own. What is left has
+        samples about an interval [s] apart.
         """
         outline, block = outline_of(self.study.tank.to_arena()), self.study.block
         found = []
@@ -148,7 +149,7 @@ class PreparedRecordings:
             gaps = np.flatnonzero(np.diff(one.time) > 1.5 * float(np.median(np.diff(one.time)))) + 1
             for later in range(FILTER.settling_samples + 1):
                 left_out[np.minimum(gaps + later, one.time.size - 1)] = True
-            found.append(replace(one, excluded=left_out.astype(np.uint8)))
+            found.append(replace(one, excluded=left_out.astype(np.uint8)).thinned(interval))
         return found
 
     def with_angle(self, angle: str) -> PreparedRecordings:

@@ -29,9 +29,9 @@ from driftwalk.core.errors import InputError, argument_text
 from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.interval_inflation import INFLATION
 from driftwalk.likelihood.newton import Mode
-from driftwalk.likelihood.preparation import Estimate, PreparedRecordings, estimate_of
-from driftwalk.likelihood.prior import Earlier, usual_lever
-from driftwalk.likelihood.start import first_point
+from driftwalk.likelihood.preparation import Estimate, PreparedRecordings
+from driftwalk.likelihood.prior import Earlier
+from driftwalk.likelihood.start import Starts, first_point
 from driftwalk.schema.answers.facts import fitted_value
 
 if TYPE_CHECKING:
@@ -137,22 +137,16 @@ def earlier_prior(ready: PreparedRecordings, before: Estimate) -> Earlier:
     return Earlier(centre, precision, before.weights)
 
 
-def estimate_before(earlier: EarlierFit) -> Estimate:
-    """Return the earlier fit, ready to run its filter."""
-    return estimate_of(earlier.fit, earlier.recordings, body=None)
-
-
-def first_glued_point(ready: PreparedRecordings, before: Estimate) -> Point:
+def glued_start(ready: PreparedRecordings, before: Estimate) -> Starts:
     """Return where the search begins: flow and drag of one block, noises of the recording."""
-    own, body = first_point(ready, ready.passes.spline), ready.passes.body
-    lever = None if own.log_lever is None else math.log(usual_lever(body.side, body.outline))
-    return replace(
-        own,
+    cells = len(ready.study.block.body().cells)
+    point = replace(
+        first_point(ready),
         coefficients=before.point.coefficients,
         log_drag=before.point.log_drag,
-        log_intensity=before.point.log_intensity - math.log(len(body.outline.cells)),
-        log_lever=lever,
+        log_intensity=before.point.log_intensity - math.log(cells),
     )
+    return Starts(point, (point,))
 
 
 class SharedStirring(NamedTuple):

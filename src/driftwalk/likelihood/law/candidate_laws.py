@@ -47,6 +47,7 @@ OF_PREDICTIONS: Final = ("hidden_share",)
 is wrong to the order in which the filter is. Of a dimer that was slow in the water they said 1
 where the share was 0, by seven standard deviations."""
 PULSES: Final = ("pulse_cosine", "pulse_sine")
+MODES: Final = ("mode_frequency", "mode_phase")
 INTENSITIES: Final = tuple(f"flow_intensity_{k}" for k in range(1, 64))
 """ln q in the second flow, the third and so on, less that in the first."""
 

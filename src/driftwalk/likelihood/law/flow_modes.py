@@ -11,7 +11,7 @@ one is a parameter. Their number is that with the most evidence.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, Literal, NamedTuple
 
@@ -59,12 +59,8 @@ NEEDED: Final = "record for longer, or with several bodies in the tank"
 class FlowModes(NamedTuple):
     """Modes with which the law is searched, or why there are none."""
 
-    layers: int = 1
-    """Layers of the flow: its mean and the modes."""
-    start: Point | None = None
-    weights: Weights | None = None
-    opened: Mapping[str, float] = {}
-    """Numbers of the modes, with their first values."""
+    start: Mode | None = None
+    """Where the search of the law with these modes begins."""
     unsettled: str = ""
     """Why no modes were found, in a sentence."""
 
@@ -142,12 +138,12 @@ def modes_at(
     ahead = max(evidence.values()) - evidence_of(steady, search.prior)
     if wanted == "auto" and ahead < FORWARD_SELECTION.least_evidence:
         return FlowModes(unsettled=f"{NO_EVIDENCE}; {NEEDED}")
-    number = _number_of(evidence) if wanted == "auto" else int(wanted)
+    # The smaller number where the evidence does not settle it.
+    one_does = one is not None and evidence[2] - evidence[1] < FORWARD_SELECTION.least_evidence
+    number = int(wanted) if wanted != "auto" else 1 if one_does else 2
     if number not in found:
         return FlowModes(unsettled=f"{NO_SOLUTION}; {NEEDED}")
-    mode = found[number]
-    opened = {name: mode.point.opened[name] for name in _numbers(mode)}
-    return FlowModes(1 + number, mode.point, mode.weights, opened)
+    return FlowModes(found[number])
 
 
 def _best_of(search: ModeSearch, steady: Mode, candidates: Sequence[float]) -> float | None:
@@ -158,17 +154,6 @@ def _best_of(search: ModeSearch, steady: Mode, candidates: Sequence[float]) -> f
     tried = {one: _both(few, steady, one) for one in candidates}
     found = {one: mode.deviance for one, mode in tried.items() if mode is not None}
     return min(found, key=found.__getitem__) if found else None
-
-
-def _number_of(evidence: Mapping[int, float]) -> int:
-    """Return the number of modes: the smaller one where the evidence does not settle it."""
-    if 1 in evidence and evidence[2] - evidence[1] < FORWARD_SELECTION.least_evidence:
-        return 1
-    return 2
-
-
-def _numbers(mode: Mode) -> list[str]:
-    return [name for name in ("mode_frequency", "mode_phase") if name in mode.point.opened]
 
 
 def _both(search: ModeSearch, steady: Mode, frequency: float) -> Mode | None:
