@@ -14,6 +14,7 @@ from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.progress import StagedProgress, ignore_progress, share_of_search
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
+from driftwalk.likelihood.check.criteria import agreement_criteria
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.interaction.glued import (
     GLUED,
@@ -41,7 +42,7 @@ from driftwalk.likelihood.law.force_law import Assumptions, assumptions_of, side
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.law.shape_changes import shape_facts
-from driftwalk.likelihood.measured_flow import agreement_facts, contradictions
+from driftwalk.likelihood.measured_flow import agreement_facts
 from driftwalk.likelihood.newton import (
     EXCERPT,
     FROM_ANOTHER,
@@ -237,7 +238,7 @@ def fit_motion(
             *warnings_of(facts, shares, ready.intervals, block=chosen.block),
             *law.unsettled,
             *law.noted,
-            *contradictions(facts),
+            *(one.sentence for one in agreement_criteria(facts) if one.failed),
             *(facts[one] for one in ("flow_modes_unsettled", "flow_shape_change") if one in facts),
         ]
         if law.left_out:

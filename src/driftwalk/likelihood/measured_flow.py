@@ -9,7 +9,6 @@ squares of the coefficients alone. See docs/explanation/likelihood.md.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -402,53 +401,3 @@ def _farthest(measured: MeasuredFlow, off: Floats) -> tuple[float, float, float]
     size = np.where(np.isfinite(measured.velocity[0]), np.hypot.reduce(values), -1.0)
     row, column = np.unravel_index(int(size.argmax()), size.shape)
     return float(measured.x[column]), float(measured.y[row]), float(size[row, column])
-
-
-class Agreement(NamedTuple):
-    """One question to a measured flow."""
-
-    name: str
-    p_value: float
-    sentence: str
-    """The finding, where it is one."""
-    detectable: float
-    """Misfit that is found nine times in ten."""
-
-
-def agreement_tests(facts: Mapping[str, Any]) -> list[Agreement]:
-    """Return whether a measured flow and its scale are those that move the block."""
-    if "measured_flow_p_value" not in facts:
-        return []
-    x, y = facts["measured_flow_farthest_m"]
-    expected, std = facts["measured_flow_expected"], facts["measured_flow_expected_std"]
-    found = [
-        Agreement(
-            "measured flow",
-            facts["measured_flow_p_value"],
-            "the measured flow is not the one that moves the block: chi squared of their "
-            f"difference {facts['measured_flow_chi_squared']:.0f}, expected {expected:.0f} ± "
-            f"{std:.0f}; most at x = {x:.3g} m, y = {y:.3g} m, where they are "
-            f"{1e3 * facts['measured_flow_difference_m_s']:.2g} mm/s apart: is it mirrored, "
-            "shifted, of another setting of the pumps, or are its errors larger?",
-            facts["measured_flow_detectable_m_s"],
-        )
-    ]
-    if "measured_flow_scale_p_value" in facts:
-        off = facts["measured_flow_scale"] - 1.0
-        found.append(
-            Agreement(
-                "measured scale",
-                facts["measured_flow_scale_p_value"],
-                f"the measured flow is {in_percent(abs(off))} too "
-                f"{'fast' if off > 0.0 else 'slow'} for the motion "
-                f"(± {in_percent(facts['measured_flow_scale_std'], decimals=1)}): are its length "
-                "scale and frame interval right?",
-                facts["measured_flow_scale_detectable"],
-            )
-        )
-    return found
-
-
-def contradictions(facts: Mapping[str, Any]) -> list[str]:
-    """Return what in a measured flow contradicts the motion, in sentences."""
-    return [one.sentence for one in agreement_tests(facts) if one.p_value < MEASURED.level]

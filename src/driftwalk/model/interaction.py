@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from typing import Annotated, ClassVar, Final, Literal, NamedTuple, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.units import parse_quantity
-from driftwalk.model.section import Placeholder, Quantity, Section
+from driftwalk.model.section import Placeholder, Quantity, Section, not_set
 
 Poles = Literal["turning", "fixed"]
 MagnetText = Annotated[str, Placeholder("SIZE,REMANENCE")]
@@ -88,9 +88,7 @@ class Interaction(Section):
     "turning": a magnet turns in its seat, so any face attracts any face, along the line between
     the two magnets; "fixed": its axis is the face's normal.
     """
-    attraction: Annotated[str | None, Placeholder("FILE")] = Field(
-        default=None, examples=["attraction.csv"]
-    )
+    attraction: Annotated[str | None, Placeholder("FILE")] = not_set("attraction.csv")
     """Table of the force between two faces.
 
     CSV table of the force between two faces, instead of magnets: columns gap_m, force_N, and
@@ -108,9 +106,7 @@ class Interaction(Section):
     Resistance k of the water between two blocks, 0 for none: a force k times their closing speed
     over the gap between them.
     """
-    cutoff_m: Annotated[float | Literal["auto"], Quantity("m", gt=0, le=10, words=("auto",))] = (
-        "auto"
-    )
+    cutoff_m: Annotated[float | Literal["auto"], Quantity("m", gt=0, le=10)] = "auto"
     """Gap beyond which faces and menisci feel nothing.
 
     Gap between two faces beyond which magnets, a table and menisci have no effect; "auto": where

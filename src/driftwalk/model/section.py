@@ -15,11 +15,11 @@ import re
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Final, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
 
 from driftwalk.core.errors import ConfigurationError, did_you_mean
@@ -35,7 +35,9 @@ force of a laboratory, and its third and fourth powers are still numbers. The sq
 
 @dataclass(frozen=True)
 class Quantity:
-    """Declares a number of a study: its unit, its range, and the words it may be instead.
+    """Declares a number of a study: its unit and its range.
+
+    Words of the field's type, `Literal["auto"]`, may stand in place of a number.
 
     Parameters
     ----------
@@ -43,8 +45,6 @@ class Quantity:
         SI unit of the stored value, ``"1"`` for none. Text such as ``"0.55mN"`` is read.
     ge, gt, le, lt : float, optional
         Bounds: at least, more than, at most, less than.
-    words : tuple of str
-        Words that may replace a number (``"auto"``, ``"estimate"``).
     whole : bool
         Whether only whole numbers are accepted.
     """
@@ -54,16 +54,16 @@ class Quantity:
     gt: float | None = None
     le: float | None = None
     lt: float | None = None
-    words: tuple[str, ...] = ()
     whole: bool = False
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Put `check` in front of the type's own validation."""
-        return core_schema.no_info_before_validator_function(self.check, handler(source))
+        check = partial(self.check, words=_words_in(source))
+        return core_schema.no_info_before_validator_function(check, handler(source))
 
-    def check(self, value: Any) -> Any:
+    def check(self, value: Any, words: tuple[str, ...]) -> Any:
         """Return the value in the declared unit, or a word as it is.
 
         Raises
@@ -71,13 +71,13 @@ class Quantity:
         ConfigurationError
             When it is neither, or out of range.
         """
-        if value is None or (isinstance(value, str) and value in self.words):
+        if value is None or (isinstance(value, str) and value in words):
             return value
         unit = f" {self.unit}" if self.unit != "1" else ""
-        if self.words and isinstance(value, str) and value[:1].isalpha():
+        if words and isinstance(value, str) and value[:1].isalpha():
             raise ConfigurationError(
-                f"expected a number{unit and f' in{unit}'} or {quoted(self.words)}, got '{value}'"
-                f"{did_you_mean(value, self.words)}"
+                f"expected a number{unit and f' in{unit}'} or {quoted(words)}, got '{value}'"
+                f"{did_you_mean(value, words)}"
             )
         if self.whole:
             if isinstance(value, bool) or not isinstance(value, int):
@@ -110,6 +110,11 @@ class Quantity:
 
 Seed = Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)]
 """The largest is that of a 64-bit integer of a NetCDF file."""
+
+
+def not_set(example: Any) -> Any:
+    """Return a field that is not set by default, with an example for the template."""
+    return Field(default=None, examples=[example])
 
 
 @dataclass(frozen=True)
@@ -257,8 +262,11 @@ def is_list(section: type[Section], key: str) -> bool:
 
 def words_of(section: type[Section], key: str) -> tuple[str, ...]:
     """Return the words that a field, or an item of a list, accepts; empty for any or none."""
-    parts = _parts(section.model_fields[key].annotation)
-    return tuple(dict.fromkeys(part for part in parts if isinstance(part, str)))
+    return _words_in(section.model_fields[key].annotation)
+
+
+def _words_in(annotation: Any) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(part for part in _parts(annotation) if isinstance(part, str)))
 
 
 def _parts(annotation: Any) -> Iterator[Any]:

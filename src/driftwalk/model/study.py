@@ -350,7 +350,7 @@ def declared(key: str) -> Declaration:
     """
     name, _, field_name = key.partition(".")
     of_study = Study.model_fields.get(name)
-    section = None if of_study is None else of_study.annotation
+    section: Any = None if of_study is None else of_study.annotation
     if section is None or field_name not in section.model_fields:
         raise ConfigurationError(f"a study has no key '{key}'")
     field = section.model_fields[field_name]

@@ -14,13 +14,12 @@ from scipy.optimize import minimize_scalar
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.check.criteria import MODEL_CHECK
+from driftwalk.likelihood.check.criteria import MODEL_CHECK, agreement_criteria
 from driftwalk.likelihood.check.measured import best_placement
 from driftwalk.likelihood.measured_flow import (
     MEASURED,
     MeasuredFlow,
     agreement_facts,
-    agreement_tests,
     measured_flow,
 )
 from driftwalk.likelihood.preparation import estimate_of, prepare, spline_of
@@ -261,7 +260,7 @@ def test_a_stored_fit_has_the_same_prior() -> None:
     np.testing.assert_allclose(again.normal, first.normal, rtol=1e-6)
     np.testing.assert_allclose(again.right, first.right, rtol=1e-6)
     assert fit.attrs["measured_flow"] == "piv.csv"
-    assert [one.name for one in agreement_tests(dw.schema.answers.facts.facts_of(fit))] == [
+    assert [one.name for one in agreement_criteria(dw.schema.answers.facts.facts_of(fit))] == [
         "measured flow",
         "measured scale",
     ]

@@ -95,23 +95,18 @@ class MotionComparison(NamedTuple):
         return float(logs.mean()), float(spread)
 
 
-class EstimateDistances(NamedTuple):
-    """KS distances of replicates at the estimate: to the recording, and to each other."""
-
-    distance: Floats
-    floor: Floats
-
-
-def distances_at_estimate(real: Floats, found: Replicates, *, threads: int) -> EstimateDistances:
-    """Compare a recording's steps with replicates at the estimate."""
+def distances_at_estimate(
+    real: Floats, found: Replicates, *, threads: int
+) -> tuple[Floats, Floats]:
+    """Return the KS distances of replicates at the estimate: to the recording, to each other."""
     _require_replicates(found)
     half = len(found.steps) // 2
     floor = _distances(found.steps[:half], found.steps[half:], threads)
-    return EstimateDistances(_distances([real], found.steps, threads)[0], floor.ravel())
+    return _distances([real], found.steps, threads)[0], floor.ravel()
 
 
 def compare_motion(
-    real: Floats, at_estimate: EstimateDistances, drawn: Replicates, *, threads: int
+    real: Floats, at_estimate: tuple[Floats, Floats], drawn: Replicates, *, threads: int
 ) -> MotionComparison:
     """Compare a recording's steps with simulated ones."""
     from scipy.spatial.distance import squareform
