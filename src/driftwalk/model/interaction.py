@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 from typing import Annotated, ClassVar, Final, Literal, NamedTuple, Self
 
-from pydantic import field_validator, model_validator
+from pydantic import AfterValidator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.units import parse_quantity
 from driftwalk.model.section import Placeholder, Quantity, Section, not_set
 
 Poles = Literal["turning", "fixed"]
-MagnetText = Annotated[str, Placeholder("SIZE,REMANENCE")]
 _MAGNET: Final = re.compile(
     r"\s*([\d.]+)\s*x\s*([\d.]+)\s*x\s*([\d.]+)\s*([a-zµμ]*)\s*,\s*([\d.]+)\s*(m?T)\s*"
 )
@@ -61,6 +60,14 @@ def parse_magnet(text: str) -> Magnet | None:
             f"a magnet is at most 1 m and 3 T, got '{text}'; a bare size is in m: write 5x5x2mm"
         )
     return Magnet(width, height, thickness, field)
+
+
+def _magnet_text(text: str) -> str:
+    parse_magnet(text)
+    return text
+
+
+MagnetText = Annotated[str, Placeholder("SIZE,REMANENCE"), AfterValidator(_magnet_text)]
 
 
 class Interaction(Section):
@@ -112,12 +119,6 @@ class Interaction(Section):
     Gap between two faces beyond which magnets, a table and menisci have no effect; "auto": where
     magnets attract with 0.01 mN, at the end of the table, and at 12 capillary lengths of menisci.
     """
-
-    @field_validator("magnets")
-    @classmethod
-    def _is_magnet(cls, text: str) -> str:
-        parse_magnet(text)
-        return text
 
     @model_validator(mode="after")
     def _one_attraction(self) -> Self:

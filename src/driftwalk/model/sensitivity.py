@@ -10,10 +10,10 @@ from pydantic import field_validator, model_validator
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.model.assembly import BlockCount, BondRate, HiddenFaceDrag, Latching
-from driftwalk.model.binding import faces_text
+from driftwalk.model.binding import FacesText
 from driftwalk.model.block import DragCoefficient, ForceStd, StirringLength
 from driftwalk.model.calibration import ForceGrid
-from driftwalk.model.interaction import MagnetText, parse_magnet
+from driftwalk.model.interaction import MagnetText
 from driftwalk.model.section import Quantity, Seed, distinct, is_list, not_set, without_unit
 
 
@@ -59,7 +59,7 @@ class Sensitivity(ForceGrid):
     """Bodies that blocks start glued to, to compare, an axis of the map."""
     latching: tuple[Latching, ...] | None = not_set('["collision", "connector"]')
     """Latching rules to compare, an axis of the map."""
-    faces: tuple[str, ...] | None = not_set('["any", "NSNS"]')
+    faces: tuple[FacesText, ...] | None = not_set('["any", "NSNS"]')
     """Types of the blocks' faces to compare, an axis of the map."""
     hidden_face_drag: tuple[HiddenFaceDrag, ...] | None = not_set('["none", "full"]')
     """Rules for the drag on joined faces to compare, an axis of the map."""
@@ -74,22 +74,10 @@ class Sensitivity(ForceGrid):
     force_std_N: tuple[ForceStd, ...] | None = not_set('["0.2mN", "0.55mN"]')
     """Values of force_std to compare, an axis of the map, instead of the range."""
 
-    @field_validator("faces")
-    @classmethod
-    def _face_types(cls, values: tuple[str, ...] | None) -> tuple[str, ...] | None:
-        return None if values is None else tuple(map(faces_text, values))
-
     @field_validator("*")
     @classmethod
     def _distinct(cls, value: Any) -> Any:
         return distinct(value) if isinstance(value, tuple) else value
-
-    @field_validator("magnets")
-    @classmethod
-    def _are_magnets(cls, values: tuple[str, ...] | None) -> tuple[str, ...] | None:
-        for text in values or ():
-            parse_magnet(text)
-        return values
 
     @model_validator(mode="after")
     def _grid_has_settings(self) -> Self:
