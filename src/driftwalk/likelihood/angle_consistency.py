@@ -23,9 +23,8 @@ from driftwalk.likelihood.interval_inflation import (
     parameter_facts,
 )
 from driftwalk.likelihood.law.search import evidence_of
-from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, inverse, require_mode
-from driftwalk.likelihood.preparation import Estimate
-from driftwalk.likelihood.prior import Prior
+from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, inverse, require_mode, thinned
+from driftwalk.likelihood.preparation import Estimate, PreparedRecordings
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.spline import Spline
@@ -34,17 +33,15 @@ from driftwalk.schema.answers.facts import is_open
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
-
 LEFT_OUT_NATS = 18.0
 """Least loss of log likelihood by a sample that the filter leaves out, in closed form, as it is 6
 standard deviations from its prediction: so a fit cannot gain by leaving samples out."""
 
 
 def angle_given_facts(
-    passes: Passes, prior: Prior, mode: Mode, restricted: Restricted, study: Study
+    ready: PreparedRecordings, search: ModeSearch, mode: Mode, restricted: Restricted
 ) -> dict[str, Any]:
-    """Fit once more with the angle as an input (`passes`), and compare.
+    """Fit once more with the angle as an input, and compare.
 
     Returns ``drag_coefficient_angle_given`` with its interval, and ``angle_disagreement_std``: the
     difference of the two ln C_d in combined standard deviations, NaN where the second fit has no
@@ -53,16 +50,18 @@ def angle_given_facts(
     found = restricted.point
     known = {**found.fixed, **found.opened}
     start = replace(found, log_lever=None, log_angle_noise=None, opened={}, fixed=known)
+    passes = thinned(ready.with_angle("given").passes)
+    given = ModeSearch(
+        replace(passes, layers=search.passes.layers), search.prior, search.iterations
+    )
     try:
-        search = ModeSearch(passes, prior, study.fit.iterations)
-        other = require_mode(search.find(start, mode.weights, held=FROM_NEAR))
-        again = restricted_drag(search, other, intensity=False)
+        other = require_mode(given.find(start, mode.weights, held=FROM_NEAR))
+        again = restricted_drag(given, other, intensity=False)
         covariance = parameter_covariance(other, again)
         own = parameter_covariance(mode, restricted)
         apart = abs(again.point.log_drag - found.log_drag)
-        facts = parameter_facts(
-            again.point, open_where_undetermined(covariance, other, again), study
-        )
+        stated = open_where_undetermined(covariance, other, again)
+        facts = parameter_facts(again.point, stated, ready.study)
         disagreement = apart / math.sqrt(covariance[0, 0] + own[0, 0])
     except BREAKDOWN:
         return {"angle_disagreement_std": math.nan}

@@ -12,10 +12,9 @@ import numpy as np
 
 from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.progress import StagedProgress, ignore_progress, share_of_search
+from driftwalk.core.progress import StagedProgress, ignore_progress
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
 from driftwalk.likelihood.check.criteria import agreement_criteria
-from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.interaction.glued import (
     GLUED,
     EarlierFit,
@@ -47,16 +46,14 @@ from driftwalk.likelihood.newton import (
     EXCERPT,
     FROM_ANOTHER,
     FROM_THINNED,
-    WORK,
     Mode,
     ModeSearch,
-    Passed,
     Tell,
     converged,
-    pieces,
     require_mode,
     thinned,
-    work_of_pass,
+    usual_work,
+    work_listener,
 )
 from driftwalk.likelihood.preparation import (
     AngleUse,
@@ -167,12 +164,12 @@ def fit_motion(
         passes, known = ready.passes, ready.earlier
         starts = first_points(ready) if before is None else glued_start(ready, before)
         assumptions = _assumptions(ready, before)
-        usual = _usual_work(passes, interaction=chosen.fit.interaction)
+        usual = usual_work(passes, interaction=chosen.fit.interaction)
         staged = StagedProgress(tell or ignore_progress, usual)
         reason = reason_of_no_solution(ready.wall_share, ready.tracks, chosen)
         # The stages stay in one function: they share most of their variables.
         with solved(reason):
-            passed = _work_listener(staged, usual["likelihood"])
+            passed = work_listener(staged, usual["likelihood"])
             search = ModeSearch(passes, ready.prior, chosen.fit.iterations, passed)
             wanted = chosen.fit.flow_modes
             weights = first_weights(ready.tracks, passes.spline) if known is None else known.weights
@@ -205,9 +202,7 @@ def fit_motion(
         require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, reason)
         with solved(reason):
             innovations = search.passes.innovations(restricted.point)
-        if ready.angle == "state":
-            staged.begin("angle as given")
-        turning = _turning_facts(ready, starts, search, law.mode, restricted)
+        turning = _turning_facts(ready, starts, search, law.mode, restricted, staged)
         with solved(reason):
             parameters = _parameter_facts(search, law.mode, restricted, ready)
             for alternative in law.alternatives:
@@ -283,6 +278,7 @@ def _turning_facts(
     search: ModeSearch,
     mode: Mode,
     restricted: Restricted,
+    staged: StagedProgress,
 ) -> dict[str, Any]:
     """Return how the spin goes with the water's, and C_d with the orientation as an input."""
     facts: dict[str, Any] = {}
@@ -290,9 +286,8 @@ def _turning_facts(
         mean = starts.paper.mean_coefficients
         facts["spin_correlation"] = spin_correlation(mean, thinned(ready.passes))
     if ready.angle == "state":
-        given = thinned(ready.with_angle("given").passes)
-        given = replace(given, layers=search.passes.layers)
-        facts |= angle_given_facts(given, search.prior, mode, restricted, ready.study)
+        staged.begin("angle as given")
+        facts |= angle_given_facts(ready, search, mode, restricted)
     return facts
 
 
@@ -417,31 +412,3 @@ def check_fit(
     from driftwalk.model import Study
 
     require_one_flow(prepare(as_list(recordings), study or Study(), angle, body, flow))
-
-
-def _usual_work(passes: Passes, *, interaction: bool) -> dict[str, float]:
-    """Return the work of each stage of a fit whose search ends where most do, in samples."""
-    whole, few = work_of_pass(passes), pieces(passes)
-    search = (WORK.from_afar + WORK.score_tests) * whole
-    if few is not None:
-        near = WORK.of_pieces * work_of_pass(replace(passes, series=few))
-        search = near + (WORK.from_pieces + WORK.score_tests) * whole
-    parts = {"likelihood": search, "drag": WORK.restricted * whole}
-    if passes.body.orientation == "state":
-        parts["angle as given"] = WORK.angle_given * whole
-    if interaction:
-        parts["shared stirring"] = WORK.shared_stirring * whole
-    return parts
-
-
-def _work_listener(staged: StagedProgress, usual: float) -> Passed:
-    """Return a listener to the work of the search, whose length is unknown beforehand."""
-    said, done = staged.stage("likelihood"), 0.0
-
-    def passed(work: float) -> None:
-        nonlocal done
-        done += work
-        said(share_of_search(done / usual), 1)
-
-    staged.begin("likelihood")
-    return passed

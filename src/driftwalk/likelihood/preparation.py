@@ -236,7 +236,7 @@ def prepare(
                 "recordings one by one"
             )
     # One use of the angle for all recordings, as they share the noise of the angle.
-    used_angle = use_angle(many, tracks, wanted) if has_heading(study, wanted) else "none"
+    used_angle = use_angle(many, tracks, study, wanted)
     series = series_of(parts, study, used_angle, places)
     # A tank that was fitted to the positions touches them: say so before the wall share does.
     arena = read_arena(str(many[0].attrs.get("arena", "{}")))
@@ -299,20 +299,17 @@ NO_HEADING = "no heading"
 """Use of the angle in a stored fit of a disc."""
 
 
-def has_heading(study: Study, wanted: str) -> bool:
-    """Return whether the body has a heading; refuse the wish to use that of a disc."""
-    if study.block.body().symmetry:
-        return True
-    if wanted in ("state", "given"):
-        raise InputError(
-            f"a disc has no heading: leave out {argument_text('angle', wanted)}; its drag is the "
-            "same at every angle, and the recorded one is not used"
-        )
-    return False
-
-
-def use_angle(many: Sequence[xr.Dataset], tracks: Sequence[Track], wanted: str) -> str:
+def use_angle(
+    many: Sequence[xr.Dataset], tracks: Sequence[Track], study: Study, wanted: str
+) -> str:
     """Return how orientations are used: "state", "given" or "none"."""
+    if not study.block.body().symmetry:
+        if wanted in ("state", "given"):
+            raise InputError(
+                f"a disc has no heading: leave out {argument_text('angle', wanted)}; its drag is "
+                "the same at every angle, and the recorded one is not used"
+            )
+        return "none"
     if wanted not in ("auto", "state", "given", "none"):
         raise InputError(f"angle must be 'auto', 'state', 'given' or 'none', got {wanted!r}")
     shares = [float(np.isfinite(track.theta).mean()) if track.turns else 0.0 for track in tracks]

@@ -43,7 +43,6 @@ from driftwalk.likelihood.filter.series import FILTER, Series
 from driftwalk.likelihood.law.candidate_laws import INTENSITIES
 from driftwalk.likelihood.newton import Mode, ModeSearch, known_numbers_variance
 from driftwalk.likelihood.refuse import cholesky
-from driftwalk.likelihood.spline import Spline
 
 
 class RemlPolicy(NamedTuple):
@@ -313,7 +312,8 @@ def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other
     memory = np.zeros(spline.size)
     for begin in range(0, time.size, SAMPLES_AT_ONCE):
         part = slice(begin, begin + SAMPLES_AT_ONCE)
-        rows = _bases(spline, states[part, 0], states[part, 1])
+        along_x, along_y = spline.design(states[part, 0], states[part, 1])
+        rows = (along_y[:, :, None] * along_x[:, None, :]).reshape(len(along_x), -1)
         slip = np.hypot(*(mean @ rows.T - states[part, 2:].T))
         # Along the slip the drag k |w| w pulls with 2 k |w|, across it with k |w|: their mean.
         rate = 1.5 * scale * math.exp(point.log_drag) * slip
@@ -336,9 +336,3 @@ def remembered(rows: Floats, turns: Floats, lost: Bools, memory: Floats) -> tupl
         kept[k] = share[k] * memory + (1.0 - share[k]) * row
         memory = np.zeros_like(memory) if lost[k] else left[k] * memory + (1.0 - left[k]) * row
     return kept, memory
-
-
-def _bases(spline: Spline, x: Floats, y: Floats) -> Floats:
-    """Return all basis functions at places, shape (n, coefficients of one component)."""
-    along_x, along_y = spline.design(x, y)
-    return (along_y[:, :, None] * along_x[:, None, :]).reshape(x.size, -1)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.conditions import estimated_study
-from driftwalk.core.arrays import Floats
 from driftwalk.core.progress import ignore_progress
 from driftwalk.likelihood.contacts.particles import (
     Part,
@@ -62,11 +61,9 @@ def search_walls(log_likelihood: Callable[[float, float], float], tell: Tell) ->
     """Try the walls of a coarse lattice, then of finer ones around the best of them."""
     count = len(LATTICE.restitutions) * len(LATTICE.holds) + LATTICE.fine**2 * len(LATTICE.finer)
     walls: dict[tuple[float, float], Wall] = {}
-    done = 0
-
-    def look(restitutions: Floats, holds: Floats) -> None:
-        nonlocal done
-        for restitution, hold in product(restitutions.tolist(), holds.tolist()):
+    done, places = 0, product(LATTICE.restitutions, LATTICE.holds)
+    for reach in (*LATTICE.finer, None):
+        for restitution, hold in places:
             tell(done, count, "wall")
             # The same place of two lattices may differ in its last digits.
             place = (round(restitution, 9), round(hold, 9))
@@ -74,21 +71,20 @@ def search_walls(log_likelihood: Callable[[float, float], float], tell: Tell) ->
                 found = log_likelihood(restitution, hold / (1.0 - hold))
                 walls[place] = Wall(restitution, hold, found)
             done += 1
-
-    look(np.array(LATTICE.restitutions), np.array(LATTICE.holds))
-    for wide, high in LATTICE.finer:
-        best = max(walls.values(), key=lambda wall: wall.log_likelihood)
-        look(
-            _around(best.restitution, wide, most=1.0),
-            _around(best.hold, high, most=LATTICE.most_hold),
-        )
+        if reach is not None:
+            best = max(walls.values(), key=lambda wall: wall.log_likelihood)
+            places = product(
+                _around(best.restitution, reach[0], most=1.0),
+                _around(best.hold, reach[1], most=LATTICE.most_hold),
+            )
     tell(count, count, "wall")
     return list(walls.values())
 
 
-def _around(best: float, reach: float, *, most: float) -> Floats:
+def _around(best: float, reach: float, *, most: float) -> list[float]:
     """Return the places of a finer lattice along one axis."""
-    return np.linspace(max(best - reach, 0.0), min(best + reach, most), LATTICE.fine)
+    ends = max(best - reach, 0.0), min(best + reach, most)
+    return [float(one) for one in np.linspace(*ends, LATTICE.fine)]
 
 
 class ParabolaPolicy(NamedTuple):
