@@ -16,7 +16,7 @@ from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text_files import parse_json
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.parameters import Point, body_of
+from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.filter.series import (
     FILTER,
     ORIENTED_SHARE,
@@ -125,9 +125,9 @@ class PreparedRecordings:
     @property
     def passes(self) -> Passes:
         """The filter over these recordings."""
-        body, spline = body_of(self.study, self.angle), spline_of(self.study)
+        body, flows = Body(self.study, self.angle), len(self.intervals.labels)
         layers = 1 if self.measured is None else self.measured.layers
-        return Passes(self.series, body, spline, len(self.intervals.labels), layers)
+        return Passes(self.series, body, spline_of(self.study), flows, layers)
 
     def undisturbed(self, interval: float = 0.0) -> list[Series]:
         """Return the series without what near the wall, or after a mistake, is no free motion.

@@ -299,12 +299,13 @@ def due_share(passes: Passes, prior: Floats, point: Point) -> float:
 
 
 def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other: Floats) -> None:
-    body, spline = passes.body, passes.spline
+    study, spline = passes.body.study, passes.spline
     # Many samples within a tenth of a second tell the same.
     states, time = passes.states(series, point)[:: series.pooled], series.time[:: series.pooled]
     excluded = np.maximum.reduceat(series.excluded, np.arange(0, series.time.size, series.pooled))
     mean = point.coefficients.reshape(-1, spline.size)[:2]
-    scale = 0.5 * body.water_density * body.side * body.depth / body.mass
+    block, density = study.block, study.water.density_kg_m3
+    scale = 0.5 * density * block.side_m * study.wetted_depth_m / block.mass_kg
     step = np.diff(time, prepend=time[0])
     seen = np.asarray(np.isfinite(states).all(axis=1))
     states = np.where(seen[:, None], states, 0.0)

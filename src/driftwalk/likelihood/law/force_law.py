@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.filter.parameters import Point, body_of
+from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.law.candidate_laws import (
     CHANGES,
     DRAG_SHAPES,
@@ -266,7 +266,7 @@ def side_slopes(
     passes, point = search.passes, restricted.point
     # A side larger by 1 %: the derivative is a difference of two steps of the search.
     larger = apply_overrides(study, {"block.side_m": (1.0 + 0.01) * study.block.side_m})
-    changed = replace(passes, body=body_of(larger, passes.body.orientation))
+    changed = replace(passes, body=Body(larger, passes.body.orientation))
     steps = []
     try:
         for one in (passes, changed):

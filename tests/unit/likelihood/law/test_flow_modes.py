@@ -26,7 +26,7 @@ from driftwalk.flow.arena import outline_of
 from driftwalk.flow.grid import make_grid
 from driftwalk.likelihood.check import replicates
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
-from driftwalk.likelihood.filter.parameters import Point, body_of
+from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.filter.series import layer_strengths, mode_amplitudes, series_of
 from driftwalk.likelihood.fitted_modes import mode_variables, moving_fields, stored_frames
 from driftwalk.likelihood.law import flow_modes
@@ -48,7 +48,7 @@ def passes() -> Passes:
     study = coarse_study()
     series = series_of([body_track(recording(60.0))], study, "state")
     spline = lay_spline(outline_of(study.tank.to_arena()), side=0.03, spacing=0.03)
-    return Passes(series, body_of(study, "state"), spline, layers=2)
+    return Passes(series, Body(study, "state"), spline, layers=2)
 
 
 @pytest.fixture(scope="module")
