@@ -9,9 +9,8 @@ its orientation is counted clockwise.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,9 +28,6 @@ from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.spline import Spline
 from driftwalk.schema.answers.facts import is_open
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 LEFT_OUT_NATS = 18.0
 """Least loss of log likelihood by a sample that the filter leaves out, in closed form, as it is 6
@@ -90,11 +86,6 @@ def spin_correlation(coefficients: Floats, passes: Passes) -> float:
         size = float(np.sqrt((spin**2).mean() * (vorticity**2).mean()))
         found = float((spin * vorticity).mean()) / size if size > 0.0 else 0.0
     return found if math.isfinite(found) else 0.0
-
-
-def negated(recordings: Sequence[xr.Dataset]) -> list[xr.Dataset]:
-    """Return recordings with the orientation counted the other way round."""
-    return [one.assign(theta=-one["theta"]) for one in recordings]
 
 
 def log_evidence(estimate: Estimate) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.likelihood.angle_consistency import log_evidence, negated
+from driftwalk.likelihood.angle_consistency import log_evidence
 from driftwalk.likelihood.check.criteria import (
     MODEL_CHECK,
     components_of,
@@ -325,23 +325,15 @@ def judge_fit(
     """
     try:
         check = check_model(fit, recordings, body=body)
-    except InputError as error:
-        return _unchecked(fit, str(error))
-    except BREAKDOWN as error:
-        return _unchecked(
-            fit, f"the model cannot be checked: the check broke down ({reason_of(error)})"
-        )
+    except (InputError, *BREAKDOWN) as error:
+        broken = f"the model cannot be checked: the check broke down ({reason_of(error)})"
+        why = str(error) if isinstance(error, InputError) else broken
+        unknown = verdict_variables(verdict_of([], [why]))
+        return Judged(described(fit.assign(unknown).assign_attrs(check_left_out=why)), None)
     if is_against_water(facts_of(fit)):
         fit, check = _with_angle_tried(fit, check, recordings, body=body)
     check = _with_flow_left_out(fit, check, recordings, body=body)
     return Judged(with_verdict(fit, check), check)
-
-
-def _unchecked(fit: xr.Dataset, why: str) -> Judged:
-    """Return a fit of which the recording cannot tell whether it explains it."""
-    verdict = verdict_of([], [why])
-    stored = fit.assign(verdict_variables(verdict)).assign_attrs(check_left_out=why)
-    return Judged(described(stored), None)
 
 
 def _with_angle_tried(
@@ -351,7 +343,7 @@ def _with_angle_tried(
     from driftwalk.model import parse_study
 
     seen, gain = against_water(facts_of(fit)), 0.0
-    other = negated(recordings)
+    other = [one.assign(theta=-one["theta"]) for one in recordings]
     try:
         study = parse_study(fit.attrs["study"])
         alternative = fit_motion(

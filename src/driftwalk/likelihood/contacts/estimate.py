@@ -13,14 +13,13 @@ from driftwalk.conditions import estimated_study
 from driftwalk.core.progress import ignore_progress
 from driftwalk.likelihood.contacts.particles import (
     Part,
-    Passages,
     WallLikelihood,
     passages_of,
     thinned,
 )
 from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
 from driftwalk.likelihood.newton import Tell
-from driftwalk.likelihood.preparation import Estimate, estimate_of
+from driftwalk.likelihood.preparation import estimate_of
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import described
@@ -249,6 +248,7 @@ def estimate_wall(
             "the estimate of the wall needs the orientation of the block, and this fit used none: "
             'record it, or read the column that holds it (`columns`), and fit with `angle="state"`'
         )
+    intervals = fitted_intervals(fit)
     try:
         found = [passages_of(estimate, one) for one in estimate.passes.series]
         count = sum(len(one.x) for one in found)
@@ -259,7 +259,18 @@ def estimate_wall(
                 f"{count} can be followed: record for longer, at an even rate, or where the flow "
                 "drives the block to the wall"
             )
-        data = _answer(fit, estimate, found, seed=seed, tell=tell or ignore_progress)
+        parts = [
+            Part(
+                thinned(passages, min(1.0, WALL_CONTACT.most / count)),
+                fitted_flow(fit, interval=intervals.of_flow(series.flow)[0]),
+                float(np.median(np.diff(series.time))),
+            )
+            for series, passages in zip(estimate.passes.series, found, strict=True)
+            if len(passages.x)
+        ]
+        likelihood = WallLikelihood(estimated_study(fit), estimate.point, parts, seed)
+        walls = search_walls(likelihood.log_likelihood, tell or ignore_progress)
+        data = answer(walls, float(fit["confidence"]))
     except BREAKDOWN as error:
         return left_out(f"the estimate of the wall failed: {error}")
     if is_undetermined(data):
@@ -269,23 +280,3 @@ def estimate_wall(
             "tank (`tank`) and the side of the block (`side`)"
         )
     return described(fit.assign(data))
-
-
-def _answer(
-    fit: xr.Dataset, estimate: Estimate, found: Sequence[Passages], *, seed: int, tell: Tell
-) -> dict[str, Any]:
-    """Return restitution and friction, from the passages of each series."""
-    count = sum(len(one.x) for one in found)
-    intervals = fitted_intervals(fit)
-    parts = [
-        Part(
-            thinned(passages, min(1.0, WALL_CONTACT.most / count)),
-            fitted_flow(fit, interval=intervals.of_flow(series.flow)[0]),
-            float(np.median(np.diff(series.time))),
-        )
-        for series, passages in zip(estimate.passes.series, found, strict=True)
-        if len(passages.x)
-    ]
-    likelihood = WallLikelihood(estimated_study(fit), estimate.point, parts, seed)
-    walls = search_walls(likelihood.log_likelihood, tell)
-    return answer(walls, float(fit["confidence"]))

@@ -229,11 +229,8 @@ def shared_stirring(
     from scipy.stats import norm
 
     alike = {(tuple(one.time), tuple(one.missing)) for one in ready.dropped}
-    bodies = len(ready.recordings)
-    groups = [
-        ready.series[k :: len(ready.series) // bodies] for k in range(len(ready.series) // bodies)
-    ]
-    filters = [joint_errors(ready.passes, point, group) for group in groups]
+    parts = len(ready.series) // len(ready.recordings)
+    filters = [joint_errors(ready.passes, point, ready.series[k::parts]) for k in range(parts)]
     apart = np.concatenate([one.apart[one.telling] for one in filters])
     if len(alike) > 1 or apart.size < SHARED.distances:
         why = "their clocks differ" if len(alike) > 1 else "no samples of two bodies at one time"
@@ -250,17 +247,15 @@ def shared_stirring(
     at = np.log(np.maximum(nodes, lengths[1]))
     density = np.where(nodes > 0.0, CubicSpline(logs, like[1:])(at), like[0])
     best, low, high = most_likely(nodes, density, confidence)
-    enough = 0.5 * norm.ppf(0.5 + 0.5 * confidence) ** 2
-    if like[-1] > like.max() - enough:
+    normal = norm.ppf(0.5 + 0.5 * confidence)
+    if like[-1] > like.max() - 0.5 * normal**2:
         high = math.inf
     if low == 0.0 or like.max() - like[0] < SHARED.least_evidence:
         best = low = 0.0
     facts, warnings = _answer((best, low, high), side, confidence)
     length = np.array([max(facts["stirring_length_m"], 1e-3 * side)])
-    found = _by_distance(
-        filters, np.quantile(apart, np.linspace(0, 1, SHARED.distances + 1)), length
-    )
-    distance, value, std = found
+    edges = np.quantile(apart, np.linspace(0, 1, SHARED.distances + 1))
+    distance, value, std = _by_distance(filters, edges, length)
     away = (value - _rho(distance, length[0])) / std
     facts["stirring_misfit_std"] = float(np.abs(away).max())
     if facts["stirring_misfit_std"] > SHARED.most_departure:
@@ -269,21 +264,14 @@ def shared_stirring(
             f"{facts['stirring_misfit_std']:.1f} standard deviations off at "
             f"{100 * distance[np.abs(away).argmax()]:.3g} cm"
         )
-    half = norm.ppf(0.5 + 0.5 * confidence) * std
-    quantiles = length_quantiles(nodes, density)
-    return SharedStirring(
-        facts,
-        {
-            **(quantiles if low > 0.0 else {}),
-            "force_correlation": ("body_distance", value),
-            "force_correlation_interval": (
-                ("body_distance", "bound"),
-                np.stack([value - half, value + half], 1),
-            ),
-            "body_distance": ("body_distance", distance),
-        },
-        warnings,
-    )
+    ends = np.stack([value - normal * std, value + normal * std], 1)
+    variables = {
+        **(length_quantiles(nodes, density) if low > 0.0 else {}),
+        "force_correlation": ("body_distance", value),
+        "force_correlation_interval": (("body_distance", "bound"), ends),
+        "body_distance": ("body_distance", distance),
+    }
+    return SharedStirring(facts, variables, warnings)
 
 
 def _answer(

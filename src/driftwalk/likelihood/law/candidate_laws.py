@@ -83,9 +83,7 @@ NUMBERS: Final[Mapping[str, Number]] = {
         name: Number(0.0, 1e-4, 0.3 / max(k, 1), 0.2, -1.0, 1.0) for k, name in enumerate(STRENGTHS)
     },
     **dict.fromkeys(INTENSITIES, Number(0.0, 1e-4, 3.0, 1.0, -12.0, 12.0)),
-    "strength_0": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
-    "pulse_cosine": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
-    "pulse_sine": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
+    **dict.fromkeys(("strength_0", *PULSES), Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0)),
     "pulse_frequency": Number(0.0, 1e-7, 1e-2, 1e-3, 0.0, 10.0),
     "mode_frequency": Number(0.0, 1e-7, 1e-2, 2e-4, 0.0, 10.0),
     "mode_phase": Number(0.0, 1e-4, 2.0, 0.3, -10.0, 10.0),
