@@ -15,6 +15,7 @@ from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.progress import StagedProgress, ignore_progress
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
 from driftwalk.likelihood.check.criteria import agreement_criteria
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interaction.glued import (
     GLUED,
     EarlierFit,
@@ -63,7 +64,7 @@ from driftwalk.likelihood.preparation import (
     estimate_of,
     prepare,
 )
-from driftwalk.likelihood.prior import PRIOR
+from driftwalk.likelihood.prior import PRIOR, Weights
 from driftwalk.likelihood.refuse import (
     BREAKDOWN,
     reason_of_no_solution,
@@ -223,7 +224,7 @@ def fit_motion(
             **whiteness_of(innovations)._asdict(),
             **ready.facts,
             **_search_facts(law, restricted),
-            **_measured_flow_facts(ready, law.mode, restricted),
+            **_measured_flow_facts(ready, law.mode.weights, restricted.point),
             "wetted_depth_m": chosen.wetted_depth_m,
         }
         fit = build_fit(ready, law, restricted, facts)
@@ -351,22 +352,16 @@ def _with_alternative(
 
 
 def _measured_flow_facts(
-    ready: PreparedRecordings, mode: Mode, restricted: Restricted
+    ready: PreparedRecordings, weights: Weights, point: Point
 ) -> dict[str, Any]:
     """Return how far the measured flow and the motion agree; nothing without a measured flow."""
     if ready.measured is None:
         return {}
-    sums = ready.passes.sums(restricted.point, noise="without")
+    sums = ready.passes.sums(point, noise="without")
     across, own = sums.information[:-1, -1], sums.information[-1, -1] + PRIOR.log_drag_std**-2
-    return agreement_facts(
-        ready.measured,
-        restricted.point.coefficients,
-        sums.information[:-1, :-1] - np.outer(across, across) / own,
-        smoothness=ready.prior.matrix(mode.weights),
-        factors=ready.prior.factors(mode.weights, len(ready.measured.own)),
-        determined=mode.weights.determined,
-        confidence=ready.study.fit.confidence,
-    )
+    of_motion = sums.information[:-1, :-1] - np.outer(across, across) / own
+    confidence = ready.study.fit.confidence
+    return agreement_facts(ready.prior, weights, point.coefficients, of_motion, confidence)
 
 
 def _search_facts(law: LawResult, restricted: Restricted) -> dict[str, Any]:

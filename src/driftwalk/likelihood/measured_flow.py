@@ -27,6 +27,7 @@ from driftwalk.schema import FLAGS
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.likelihood.prior import Prior, Weights
     from driftwalk.model import Study
 
 
@@ -280,12 +281,8 @@ def _least_squares(
     weight = np.where(np.isfinite(error), 1.0 / np.where(error > 0.0, error, np.inf) ** 2, 0.0)
     values = np.where(weight > 0.0, velocity, 0.0)
     normal = np.stack([products(one, along_x, along_y) for one in weight])
-    right = np.stack(
-        [
-            (along_y.T @ (one * value) @ along_x).ravel()
-            for one, value in zip(weight, values, strict=True)
-        ]
-    )
+    pairs = zip(weight, values, strict=True)
+    right = np.stack([(along_y.T @ (one * value) @ along_x).ravel() for one, value in pairs])
     own, rank, squares = np.zeros_like(right), 0, 0.0
     for k in range(2):
         spread, base = np.linalg.eigh(normal[k])
@@ -298,27 +295,22 @@ def _least_squares(
 
 
 def agreement_facts(
-    measured: MeasuredFlow,
-    coefficients: Floats,
-    information: Floats,
-    *,
-    smoothness: Floats,
-    factors: Floats,
-    determined: float,
-    confidence: float,
+    prior: Prior, weights: Weights, coefficients: Floats, information: Floats, confidence: float
 ) -> dict[str, Any]:
     """Return how far the motion pulls the flow away from the measured one.
 
     The fitted flow is compared with that of the vectors and the prior of smoothness alone, in
-    errors of the vectors. `information` is that of the motion on the coefficients, `smoothness` the
-    precision of one component under its prior, times one of the `factors` for each component.
+    errors of the vectors. `information` is that of the motion on the coefficients.
     """
+    measured = prior.measured
+    assert measured is not None
     from scipy.linalg import block_diag
     from scipy.optimize import brentq
     from scipy.special import ndtri
     from scipy.stats import norm
 
-    flow = coefficients.reshape(len(measured.own), -1)
+    flow, determined = coefficients.reshape(len(measured.own), -1), weights.determined
+    smoothness, factors = prior.matrix(weights), prior.factors(weights, len(flow))
     k, precision = measured.scale(coefficients, determined)
     _, score, precise = measured.deviance(coefficients, determined)
     score = score - ((factors[:, None] * flow) @ smoothness).ravel()
@@ -343,33 +335,33 @@ def agreement_facts(
     one = math.sqrt(unit * float(bases) / max(shift, 1e-300))
     size = math.sqrt(float(np.mean(measured.velocity[:, there] ** 2)))
     more = (MEASURED.tolerated * size / one) ** 2
+    least, most = more, 4.0 * (dof + more) + 1e3
+    limit = brentq(lambda sum_: _tail(sum_, dof, more) - MEASURED.level, 0.0, 10.0 * most)
+    detectable = brentq(lambda shift: _tail(limit, dof, shift) - POWER.share, least, most)
+    *farthest, difference = _farthest(measured, k * off)
     found: dict[str, Any] = {
         "measured_flow_chi_squared": squares / unit,
         "measured_flow_expected": dof + more,
         "measured_flow_expected_std": math.sqrt(2.0 * (dof + 2.0 * more)),
         "measured_flow_p_value": _tail(squares / unit, dof, more),
         "measured_flow_determined": determined,
+        "measured_flow_detectable_m_s": one * math.sqrt(detectable),
+        "measured_flow_farthest_m": farthest,
+        "measured_flow_difference_m_s": difference,
     }
-    least, most = more, 4.0 * (dof + more) + 1e3
-    limit = brentq(lambda sum_: _tail(sum_, dof, more) - MEASURED.level, 0.0, 10.0 * most)
-    found["measured_flow_detectable_m_s"] = one * math.sqrt(
-        brentq(lambda shift: _tail(limit, dof, shift) - POWER.share, least, most)
-    )
-    place = _farthest(measured, k * off)
-    found |= {"measured_flow_farthest_m": list(place[:2]), "measured_flow_difference_m_s": place[2]}
     if measured.scale_std > 0.0:
         variance = 1.0 / precision + (k / precision) ** 2 * float(along @ covariance @ along)
         free = max(measured.scale_std**2 - variance, 0.0)
         std = math.sqrt(variance)
         reach = float(ndtri(0.5 + 0.5 * confidence)) * std
         chance = 2.0 * float(norm.sf(abs(k - 1.0) / math.sqrt(free))) if free > 0.0 else 1.0
+        sigmas = detectable_sigmas(0.5 * MEASURED.level)
         found |= {
             "measured_flow_scale": k,
             "measured_flow_scale_interval": [k - reach, k + reach],
             "measured_flow_scale_std": std,
             "measured_flow_scale_p_value": chance,
-            "measured_flow_scale_detectable": detectable_sigmas(0.5 * MEASURED.level)
-            * math.sqrt(free),
+            "measured_flow_scale_detectable": sigmas * math.sqrt(free),
         }
     return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from driftwalk.likelihood.measured_flow import (
     measured_flow,
 )
 from driftwalk.likelihood.preparation import estimate_of, prepare, spline_of
+from driftwalk.likelihood.prior import Weights
 from driftwalk.likelihood.spline import Spline
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import build_flow_field
@@ -220,10 +222,11 @@ def test_the_statistic_of_agreement_has_its_distribution(monkeypatch: pytest.Mon
             covariance = np.linalg.inv(free + bent + prior)
             point = point + (covariance @ (score + pull)).reshape(shape)
             determined = made.determined(point, covariance, determined)
-        facts = agreement_facts(
-            made, point, free, smoothness=smooth, factors=np.ones(2), determined=determined,
-            confidence=0.9,
-        )  # fmt: skip
+        smoothness: Any = SimpleNamespace(
+            measured=made, matrix=lambda _: smooth, factors=lambda _, count: np.ones(count)
+        )
+        weights = Weights(1.0, 1.0, determined)
+        facts = agreement_facts(smoothness, weights, point, free, confidence=0.9)
         found.append((facts["measured_flow_p_value"], facts["measured_flow_scale_p_value"]))
     for p_values in np.transpose(found):
         assert 0.32 < p_values.mean() < 0.68  # 4 sd of the mean of uniform numbers
