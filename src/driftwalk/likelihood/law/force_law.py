@@ -152,11 +152,8 @@ def inertia_of(study: Study, point: Point) -> Inertia:
 
 def stated_drag(point: Point, study: Study) -> float:
     """Return C_d of the quadratic part of the drag, with the added mass."""
-    return (
-        inertia_of(study, point).share
-        * (1.0 - point.number("linear_share"))
-        * math.exp(point.log_drag)
-    )
+    share = inertia_of(study, point).share
+    return share * (1.0 - point.number("linear_share")) * math.exp(point.log_drag)
 
 
 def inertia_facts(inertia: Inertia, facts: dict[str, Any], normal: float) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from driftwalk.likelihood.check.criteria import (
     tail_criterion,
     time_and_place_criterion,
 )
-from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, velocity_at
+from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, Part, velocity_at
 from driftwalk.likelihood.check.place import (
     Layout,
     LocalMeans,
@@ -58,9 +58,16 @@ def contrast_of(
     found = Contrast([group], size)
     found.begin(PARAMETERS)
     half = ROWS // 2
-    for rows in (slice(0, half), slice(half, ROWS)):
-        found.add(group.ravel()[rows], weight[rows], white[rows], jacobian[rows])
+    for start in (0, half):
+        rows = slice(start, start + half)
+        found.add(part_of(white[rows], start), {"one": weight[rows]}, jacobian[rows], None)
     return found
+
+
+def part_of(white: np.ndarray, start: int = 0, pooled: int = 1) -> Part:
+    """Return a part of the only series, whose columns are all parameters."""
+    whole, nothing = ((slice(None), slice(None)),), np.zeros(0)
+    return Part(0, 0, start, nothing, nothing, white, whole, pooled)
 
 
 def test_sums_and_their_variance_by_dense_algebra() -> None:
@@ -452,14 +459,10 @@ def test_sums_of_means_over_samples_are_those_of_all() -> None:
     whole, means = (Contrast([groups], 5) for _ in range(2))
     for one in (whole, means):
         one.begin(PARAMETERS)
-    whole.add(
-        groups.ravel(),
-        weight[every].ravel(),
-        white.ravel(),
-        jacobian[every].reshape(-1, PARAMETERS),
-    )
+    rows = jacobian[every].reshape(-1, PARAMETERS)
+    whole.add(part_of(white), {"one": weight[every].ravel()}, rows, None)
     rows = jacobian.reshape(-1, PARAMETERS)
-    means.add(groups, weight.ravel(), white, rows, pooled=pooled)
+    means.add(part_of(white, pooled=pooled), {"one": weight.ravel()}, rows, None)
     assert means.score == pytest.approx(whole.score)
     assert means.power == pytest.approx(whole.power)
     assert means.slope == pytest.approx(whole.slope)
