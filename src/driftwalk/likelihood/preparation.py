@@ -350,8 +350,7 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     from driftwalk.model import apply_overrides, parse_study
 
     fit = require_fit(fit)
-    study = parse_study(fit.attrs["study"])
-    study = apply_overrides(study, fitted_law(fit))
+    study = apply_overrides(parse_study(fit.attrs["study"]), fitted_law(fit))
     ready = prepare(recordings, study, fit.attrs["angle"], body, stored_flow(fit))
     if ready.samples != int(fit["samples"]):
         raise InputError(

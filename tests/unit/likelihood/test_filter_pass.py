@@ -362,7 +362,8 @@ def test_noise_of_the_camera_behind_contacts_is_hardly_drag(passes: Passes) -> N
     rng = np.random.default_rng(0)
     flights, samples, drag, intensity, noise = 2400, 7, 0.45, 1e-7, 3e-4
     body = passes.body
-    rate = 0.5 * body.water_density * drag * body.side * body.depth / body.mass
+    block, water, depth = body.study.block, body.study.water, body.study.wetted_depth_m
+    rate = 0.5 * water.density_kg_m3 * drag * block.side_m * depth / block.mass_kg
     way = (-1.0) ** np.arange(flights)
     velocity = way * (0.03 + 0.003 * rng.normal(size=flights))
     place, places = -0.01 * way, []
