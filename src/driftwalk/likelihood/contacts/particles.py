@@ -245,13 +245,10 @@ def _propagated(
         force_std=study.forces.force_std_N,
     )
     found = _core.simulate(model, worlds, keys, threads=default_threads(), precision="single")
-    pose, motion = [], []
-    for name, part in zip(names, found[:3], strict=False):
-        now, then = part[:, 0].astype(np.float64), part[:, 1].astype(np.float64)
-        change = wrap_angle(then - now) if name == "theta" else then - now
-        pose.append(now.reshape(shape))
-        motion.append((change / step).reshape(shape))
-    return [*pose, *motion]
+    poses = np.stack(found[:3]).astype(np.float64)
+    now, change = poses[:, :, 0], poses[:, :, 1] - poses[:, :, 0]
+    change[2] = wrap_angle(change[2])
+    return [one.reshape(shape) for one in (*now, *(change / step))]
 
 
 def _resampled(state: Sequence[Floats], weight: Floats, uniform: Floats) -> list[Floats]:

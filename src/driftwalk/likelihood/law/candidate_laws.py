@@ -28,12 +28,6 @@ class Number(NamedTuple):
     """Two values between which the derivative is taken where the number is closed; by default the
     model's and one step above it."""
 
-    def tried_from(self, value: float) -> tuple[float, float]:
-        """Return the two values for the derivative where the number is closed at a value."""
-        if self.trial is not None and value == self.model:
-            return self.trial
-        return value, value + self.step
-
 
 STRENGTHS: Final = ("strength_trend", *(f"strength_{k}" for k in range(1, 7)))
 """Numbers of a slow change of the flow's strength over the recording: a straight line, then cosines

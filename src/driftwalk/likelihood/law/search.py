@@ -141,12 +141,12 @@ class LawSearch:
             mode = require_mode(self._from_afar(tries, weights))
             return self._alone(mode, floating=on)
         paper = self.search.find_from_afar(starts.paper, weights)
-        if paper is not None and paper.converged:
+        if paper is None:
+            return self._compared(starts, weights, None)
+        if paper.converged:
             tests = score_tests(self.search, paper, (*FLOATING, *self.assumptions.tried))
             if tests is not None and not self._is_doubted(tests, paper):
                 return self._undoubted(paper, tests)
-        if paper is None:
-            return self._compared(starts, weights, paper)
         alone = self._alone(paper, floating=False)
         return self._try_search(
             alone, "the other law", lambda law: self._compared(starts, weights, law.mode)
