@@ -41,7 +41,7 @@ from driftwalk.likelihood.law.flow_modes import (
 from driftwalk.likelihood.law.force_law import Assumptions, assumptions_of, side_slopes, stated_drag
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
-from driftwalk.likelihood.law.shape_changes import shape_facts
+from driftwalk.likelihood.law.shape_changes import shape_change, shape_facts
 from driftwalk.likelihood.measured_flow import agreement_facts
 from driftwalk.likelihood.newton import (
     EXCERPT,
@@ -194,7 +194,7 @@ def fit_motion(
                 if wanted == "none" or modes.start is not None:
                     break
                 # Under the right law the line may stand out that did not under the paper's.
-                shape = laws.selection.shape_change(law.base)
+                shape = shape_change(laws.selection.scores, law.base)
                 modes = modes_at(laws.search, law.base, shape, wanted)
                 if modes.start is None:
                     break
@@ -208,7 +208,7 @@ def fit_motion(
             parameters = _parameter_facts(search, law.mode, restricted, ready)
             for alternative in law.alternatives:
                 parameters = _with_alternative(parameters, search, alternative, ready)
-            shape = laws.selection.shape_change(law.mode)
+            shape = shape_change(laws.selection.scores, law.mode)
             stirring = (
                 shared_stirring(ready, restricted.point, staged)
                 if before is None or earlier is None

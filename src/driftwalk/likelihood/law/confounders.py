@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 from driftwalk.core.units import in_percent
 from driftwalk.likelihood.filter.series import Series, usable_intervals
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, is_retained
+from driftwalk.likelihood.law.shape_changes import shape_change
 from driftwalk.likelihood.newton import FROM_ANOTHER, Mode, converged
 
 LAW_NUMBERS: Final[Mapping[str, tuple[str, str]]] = {
@@ -46,7 +47,7 @@ def objections_to(
 ) -> dict[str, str]:
     """Return for each number of the law that a confounder explains why, in a sentence."""
     search, least = selection.search, selection.least
-    shape = selection.shape_change(mode)
+    shape = shape_change(selection.scores, mode)
     if shape is not None and shape.significant:
         why = "the shape of the flow changes, which can look like such a law"
         return {name: f"{number_sentence(mode, name)} was not opened: {why}" for name in names}

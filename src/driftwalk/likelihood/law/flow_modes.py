@@ -18,11 +18,10 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from driftwalk.core.errors import InputError, argument_text
-from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.law.score_tests import StrengthScores
 from driftwalk.likelihood.law.search import evidence_of
-from driftwalk.likelihood.law.shape_changes import ShapeChange, find_shape_change
+from driftwalk.likelihood.law.shape_changes import ShapeChange, shape_change
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, thinned
 from driftwalk.likelihood.preparation import Estimate, PreparedRecordings
 from driftwalk.likelihood.prior import Prior, Weights
@@ -95,12 +94,6 @@ def with_layers(search: ModeSearch, layers: int) -> ModeSearch:
     return replace(search, passes=passes, prior=Prior(passes))
 
 
-def line_of(passes: Passes, mode: Mode) -> ShapeChange | None:
-    """Return the highest line in the spectra of the cells at a mode."""
-    scores = StrengthScores(passes).at(mode)
-    return find_shape_change(passes.series, scores, side=passes.body.side)
-
-
 def find_flow_modes(
     search: ModeSearch, start: Point, weights: Weights, wanted: Wanted
 ) -> FlowModes:
@@ -112,7 +105,7 @@ def find_flow_modes(
         return FlowModes()
     search = replace(search, passes=thinned(search.passes))
     steady = search.find_from_afar(start, weights)
-    line = None if steady is None else line_of(search.passes, steady)
+    line = None if steady is None else shape_change(StrengthScores(search.passes), steady)
     return modes_at(search, steady, line, wanted)
 
 

@@ -22,7 +22,6 @@ from driftwalk.likelihood.law.score_tests import (
     find_pulses,
     score_tests,
 )
-from driftwalk.likelihood.law.shape_changes import ShapeChange, find_shape_change
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch
 from driftwalk.likelihood.prior import Weights
 from driftwalk.schema.answers.force_law import FORWARD_SELECTION
@@ -87,13 +86,6 @@ class ForwardSelection:
         self.search, self.assumptions = search, assumptions
         self.least = least_effects(search.passes.body.side)
         self.scores = StrengthScores(search.passes)
-
-    def shape_change(self, mode: Mode) -> ShapeChange | None:
-        """Return the change of the flow's shape at a mode; nothing with several flows."""
-        passes = self.search.passes
-        if passes.flows > 1:
-            return None
-        return find_shape_change(passes.series, self.scores.at(mode), side=passes.body.side)
 
     def select(self, found: LawResult) -> LawResult:
         """Return the law found, with the departures that the recording asks for."""

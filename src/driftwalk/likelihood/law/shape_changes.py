@@ -18,7 +18,8 @@ import numpy as np
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.law.candidate_laws import STRENGTHS
-from driftwalk.likelihood.law.score_tests import Scores, ScoreTests
+from driftwalk.likelihood.law.score_tests import Scores, ScoreTests, StrengthScores
+from driftwalk.likelihood.newton import Mode
 
 
 class ShapePolicy(NamedTuple):
@@ -90,6 +91,14 @@ class ShapeChange(NamedTuple):
             f"the tank go to and fro together (p = {self.p_value:.1g}). A steady flow does not "
             "describe it: the fitted C_d, σ_F and force law do not hold"
         )
+
+
+def shape_change(scores: StrengthScores, mode: Mode) -> ShapeChange | None:
+    """Return the change of the flow's shape at a mode; nothing with several flows."""
+    passes = scores.passes
+    if passes.flows > 1:
+        return None
+    return find_shape_change(passes.series, scores.at(mode), side=passes.body.side)
 
 
 def find_shape_change(

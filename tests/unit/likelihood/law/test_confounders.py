@@ -34,14 +34,15 @@ def series(left_out: float) -> Series:
 
 def objection(alone: Mode | None, *, left_out: float = 0.6) -> str:
     """Return why a power of 2.47 ± 0.02 was not opened, given what is found without the wall."""
-    search: Any = SimpleNamespace(passes=SimpleNamespace(series=[series(0.0)]))
+    passes = SimpleNamespace(series=[series(0.0)], flows=2)
+    search: Any = SimpleNamespace(passes=passes)
     search.of = lambda _: SimpleNamespace(shortened=lambda: SimpleNamespace(find=find))
 
     def find(*_: Any, **__: Any) -> Mode | None:
         return alone
 
     selection: Any = SimpleNamespace(
-        search=search, least=least_effects(0.03), shape_change=lambda _: None
+        search=search, least=least_effects(0.03), scores=SimpleNamespace(passes=passes)
     )
     found = objections_to(mode((2.47, 0.02)), ["drag_power"], selection, lambda: [series(left_out)])
     return found.get("drag_power", "")
