@@ -178,14 +178,19 @@ def glued_stirring(
     off = expected - observed
     squares = np.einsum("na,ab,nb->n", off, np.linalg.inv(covariance), off)
     rho = most_likely(nodes, -0.5 * squares, ready.study.fit.confidence)
-    facts: dict[str, Any] = {}
-    length = [_length_of(one, body.side) for one in rho]
-    for name, (value, *ends) in (("stirring_correlation", rho), ("stirring_length_m", length)):
-        facts |= {name: value, f"{name}_interval": ends}
+    facts = stirring_facts(rho, [_length_of(one, body.side) for one in rho])
     if len(observed) > 1:
         facts["stirring_misfit_std"] = math.sqrt(float(squares.min()))
     lengths = np.array([_length_of(float(one), body.side) for one in nodes])
     return SharedStirring(facts, length_quantiles(lengths, -0.5 * squares))
+
+
+def stirring_facts(correlation: Sequence[float], length: Sequence[float]) -> dict[str, Any]:
+    """Return the correlation at one side and the length [m], each with the ends of its interval."""
+    facts: dict[str, Any] = {}
+    for name, one in (("stirring_correlation", correlation), ("stirring_length_m", length)):
+        facts |= {name: one[0], f"{name}_interval": [*one[1:]]}
+    return facts
 
 
 def length_quantiles(lengths: Floats, log_density: Floats) -> dict[str, Any]:

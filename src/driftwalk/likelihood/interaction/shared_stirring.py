@@ -29,7 +29,12 @@ from driftwalk.likelihood.filter.difference_pairs import unpacked
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import FILTER, Series
-from driftwalk.likelihood.interaction.glued import SharedStirring, length_quantiles, most_likely
+from driftwalk.likelihood.interaction.glued import (
+    SharedStirring,
+    length_quantiles,
+    most_likely,
+    stirring_facts,
+)
 from driftwalk.likelihood.newton import thinned
 from driftwalk.likelihood.preparation import PreparedRecordings
 
@@ -278,14 +283,8 @@ def _answer(
     length: tuple[float, float, float], side: float, confidence: float
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the length [m] and the correlation at one side with intervals; a warning for none."""
-    value, low, high = length
-    rho = [float(_rho(side, max(one, 1e-3 * side))) for one in length]
-    facts = {
-        "stirring_correlation": rho[0],
-        "stirring_correlation_interval": rho[1:],
-        "stirring_length_m": value,
-        "stirring_length_m_interval": [low, high],
-    }
+    _, low, high = length
+    facts = stirring_facts([float(_rho(side, max(one, 1e-3 * side))) for one in length], length)
     if low > 0.0:
         return facts, []
     most = (
