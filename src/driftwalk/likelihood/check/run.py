@@ -249,15 +249,13 @@ def check_model(
             restarted(problems, seen, states, every=every)
             for every in (RESTART.steps_s, RESTART.change_s)
         )
-        real, threads = recorded_steps(series, seen), problems[0].like.threads
+        real = recorded_steps(series, seen)
         near = distances_at_estimate(
-            real,
-            replicates_at_estimate(fit, seen, series, count=replicates, seed=seed),
-            threads=threads,
+            real, replicates_at_estimate(fit, seen, series, count=replicates, seed=seed)
         )
         spread = found.leverage.spread
         drawn = posterior_replicates(fit, seen, series, spread, count=replicates, seed=seed)
-        motion = compare_motion(real, near, drawn, threads=threads)
+        motion = compare_motion(real, near, drawn)
         free = posterior_replicates(
             fit, seen, longer, spread, count=replicates, seed=seed, with_path=True
         )

@@ -375,8 +375,8 @@ def replicates(seed: int, *, count: int = 8, spread: float = 1.0) -> Replicates:
 def test_distances_and_bands_by_brute_force() -> None:
     real = np.abs(np.random.default_rng(1).normal(size=(400, 2)))
     estimate, drawn = replicates(2), replicates(3)
-    near = distances_at_estimate(real, estimate, threads=1)
-    found = compare_motion(real, near, drawn, threads=1)
+    near = distances_at_estimate(real, estimate)
+    found = compare_motion(real, near, drawn)
     assert found.distance == pytest.approx([ks_distance(real, one) for one in estimate.steps])
     pairs = [ks_distance(a, b) for a in estimate.steps[:4] for b in estimate.steps[4:]]
     assert found.floor == pytest.approx(pairs)
@@ -391,16 +391,16 @@ def test_distances_and_bands_by_brute_force() -> None:
     assert (found.turning_angle.median <= found.turning_angle.high).all()
     assert found.p_value > 0.01
     assert found.rank_p_value > 1 / 9
-    near = distances_at_estimate(1.5 * real, estimate, threads=1)
-    wide = compare_motion(1.5 * real, near, drawn, threads=1)
+    near = distances_at_estimate(1.5 * real, estimate)
+    wide = compare_motion(1.5 * real, near, drawn)
     assert wide.rank_p_value == pytest.approx(1 / 9)
     assert wide.p_value < 1e-3
 
 
 def test_steps_that_differ_are_put_into_words() -> None:
     real = 1.5 * np.abs(np.random.default_rng(1).normal(size=(400, 2)))
-    near = distances_at_estimate(real, replicates(2), threads=1)
-    motion = compare_motion(real, near, replicates(3), threads=1)
+    near = distances_at_estimate(real, replicates(2))
+    motion = compare_motion(real, near, replicates(3))
     found = {angle: motion_criterion(motion, angle=angle) for angle in ("given", "none")}
     assert found["given"].failed
     assert f"KS distance {motion.drawn_distance.mean():.3f}" in found["given"].sentence
@@ -442,7 +442,7 @@ def test_a_wrong_place_that_hardly_counts_in_the_drag_is_a_note(added: float, fa
 def test_too_few_sound_replicates_are_refused() -> None:
     few = Replicates(replicates(4).steps[:2], [[], []], 6)
     with pytest.raises(InputError, match="6 of 8 simulated recordings broke down"):
-        compare_motion(np.ones((40, 2)), replicates(5), few, threads=1)
+        compare_motion(np.ones((40, 2)), replicates(5), few)
 
 
 def test_sums_of_means_over_samples_are_those_of_all() -> None:
