@@ -251,17 +251,23 @@ def shared_stirring(
     # Below the shortest length the bodies do not know it from zero.
     at = np.log(np.maximum(nodes, lengths[1]))
     density = np.where(nodes > 0.0, CubicSpline(logs, like[1:])(at), like[0])
+    warnings: list[str] = []
     best, low, high = most_likely(nodes, density, confidence)
     normal = norm.ppf(0.5 + 0.5 * confidence)
     if like[-1] > like.max() - 0.5 * normal**2:
         high = math.inf
     if low == 0.0 or like.max() - like[0] < SHARED.least_evidence:
         best = low = 0.0
-    facts, warnings = _answer((best, low, high), side, confidence)
-    length = np.array([max(facts["stirring_length_m"], 1e-3 * side)])
+    if not low > 0.0:
+        known = math.isfinite(high)
+        most = f": at most {1e3 * high:.3g} mm ({in_percent(confidence)})" if known else ""
+        warnings.append(f"cannot tell a length of the stirring from none{most}")
+    rho = [float(_rho(side, max(one, 1e-3 * side))) for one in (best, low, high)]
+    facts = stirring_facts(rho, (best, low, high))
+    length = max(best, 1e-3 * side)
     edges = np.quantile(apart, np.linspace(0, 1, SHARED.distances + 1))
     distance, value, std = _by_distance(filters, edges, length)
-    away = (value - _rho(distance, length[0])) / std
+    away = (value - _rho(distance, length)) / std
     facts["stirring_misfit_std"] = float(np.abs(away).max())
     if facts["stirring_misfit_std"] > SHARED.most_departure:
         warnings.append(
@@ -277,20 +283,6 @@ def shared_stirring(
         "body_distance": ("body_distance", distance),
     }
     return SharedStirring(facts, variables, warnings)
-
-
-def _answer(
-    length: tuple[float, float, float], side: float, confidence: float
-) -> tuple[dict[str, Any], list[str]]:
-    """Return the length [m] and the correlation at one side with intervals; a warning for none."""
-    _, low, high = length
-    facts = stirring_facts([float(_rho(side, max(one, 1e-3 * side))) for one in length], length)
-    if low > 0.0:
-        return facts, []
-    most = (
-        f": at most {1e3 * high:.3g} mm ({in_percent(confidence)})" if math.isfinite(high) else ""
-    )
-    return facts, [f"cannot tell a length of the stirring from none{most}"]
 
 
 def _rho(distance: npt.ArrayLike, length: npt.ArrayLike) -> Floats:
@@ -309,7 +301,7 @@ def _summed(
 
 
 def _by_distance(
-    filters: Sequence[JointErrors], edges: Floats, length: Floats
+    filters: Sequence[JointErrors], edges: Floats, length: float
 ) -> tuple[Floats, Floats, Floats]:
     """Return mean distances, the correlations there, and their standard deviations.
 
@@ -326,7 +318,7 @@ def _by_distance(
 
     def of(errors: JointErrors) -> Correlations:
         where = np.clip(np.searchsorted(edges, errors.apart, side="right") - 1, 0, count - 1)
-        return lambda k: _rho(errors.apart[k], length[0]) + moves[:, where[k]]
+        return lambda k: _rho(errors.apart[k], length) + moves[:, where[k]]
 
     like = _summed(filters, of, len(moves))
     up, down = like[1 : count + 1], like[count + 1 :]
