@@ -133,8 +133,8 @@ class PreparedRecordings:
         """Return the series without what near the wall, or after a mistake, is no free motion.
 
         Left out as well are intervals with a corner within half a side of the wall, and those next
-        to a gap: a sample or a frame that is missing may be a mistake of its own. What is left has
-        samples about an interval [s] apart.
+        to a gap: a sample or a frame that is missing may be a mistake of its own. The samples are
+        about an interval [s] apart.
         """
         outline, block = outline_of(self.study.tank.to_arena()), self.study.block
         found = []
