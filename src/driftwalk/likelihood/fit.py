@@ -15,6 +15,7 @@ from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.progress import StagedProgress, ignore_progress
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
 from driftwalk.likelihood.check.criteria import agreement_criteria
+from driftwalk.likelihood.check.measured import agreement_facts
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interaction.glued import (
     GLUED,
@@ -42,7 +43,6 @@ from driftwalk.likelihood.law.force_law import Assumptions, assumptions_of, side
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.law.shape_changes import shape_change, shape_facts
-from driftwalk.likelihood.measured_flow import agreement_facts
 from driftwalk.likelihood.newton import (
     EXCERPT,
     FROM_ANOTHER,

@@ -18,7 +18,6 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.units import in_percent
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.check.power import POWER, detectable_sigmas
 from driftwalk.likelihood.filter.parameters import Amplitudes
 from driftwalk.likelihood.measured_series import amplitudes_in, compressed
 from driftwalk.likelihood.spline import Spline, products
@@ -27,7 +26,6 @@ from driftwalk.schema import FLAGS
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.likelihood.prior import Prior, Weights
     from driftwalk.model import Study
 
 
@@ -129,7 +127,7 @@ class MeasuredFlow:
         if self.scale_std > 0.0:
             value += 0.5 * ((k - 1.0) / self.scale_std) ** 2
         # As k goes with the inverse of the flow's size, ``determined ln k`` bends upwards along it.
-        bent = self._curvature(flow, k, precision + 2.0 * determined / k**2)
+        bent = self.curvature(flow, k, precision + 2.0 * determined / k**2)
         return value, k * pull.ravel(), bent
 
     def determined(self, coefficients: Floats, covariance: Floats, before: float) -> float:
@@ -140,7 +138,8 @@ class MeasuredFlow:
         size = len(curvature)
         return min(float((curvature * covariance[:size, :size]).sum()), float(self.rank))
 
-    def _curvature(self, flow: Floats, k: float, precision: float) -> Floats:
+    def curvature(self, flow: Floats, k: float, precision: float) -> Floats:
+        """Return the curvature at a flow (2 layers, n) and a scale that is known to a precision."""
         size = self.spline.size
         found = np.zeros((flow.size, flow.size))
         for component in range(len(flow)):
@@ -292,104 +291,3 @@ def _least_squares(
         off = values[k] - along_y @ own[k].reshape(spline.rows, spline.columns) @ along_x.T
         squares += float((weight[k] * off**2).sum())
     return _Solved(normal, right, own, rank, squares)
-
-
-def agreement_facts(
-    prior: Prior, weights: Weights, coefficients: Floats, information: Floats, confidence: float
-) -> dict[str, Any]:
-    """Return how far the motion pulls the flow away from the measured one.
-
-    The fitted flow is compared with that of the vectors and the prior of smoothness alone, in
-    errors of the vectors. `information` is that of the motion on the coefficients.
-    """
-    measured = prior.measured
-    assert measured is not None
-    from scipy.linalg import block_diag
-    from scipy.optimize import brentq
-    from scipy.special import ndtri
-    from scipy.stats import norm
-
-    flow, determined = coefficients.reshape(len(measured.own), -1), weights.determined
-    smoothness, factors = prior.matrix(weights), prior.factors(weights, len(flow))
-    k, precision = measured.scale(coefficients, determined)
-    _, score, precise = measured.deviance(coefficients, determined)
-    score = score - ((factors[:, None] * flow) @ smoothness).ravel()
-    precise = precise + block_diag(*(factor * smoothness for factor in factors))
-    alone, covariance = np.linalg.inv(precise), np.linalg.inv(precise + information)
-    off = -alone @ score
-    form = _of_difference(measured, flow, k, precision)
-    squares = float(off @ form @ off)
-    # Two estimates of which one knows more: their difference has the difference of the covariances.
-    less = alone - covariance
-    spread = form @ less
-    mean = max(float(np.trace(spread)), 1e-6)
-    half_variance = max(float((spread * spread.T).sum()), 1e-12)
-    # A chi squared with the same mean and variance (Satterthwaite).
-    unit, dof = half_variance / mean, mean**2 / half_variance
-    # A random difference of the flows, as detailed as the knots, by which the sum grows by 1.
-    shift = float(((less @ form) * (form @ less @ form).T).sum())
-    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
-    along_x, along_y = measured.spline.design(measured.x, measured.y)
-    there = np.isfinite(measured.velocity[0])
-    bases = np.outer((along_y**2).sum(axis=1), (along_x**2).sum(axis=1))[there].mean()
-    one = math.sqrt(unit * float(bases) / max(shift, 1e-300))
-    size = math.sqrt(float(np.mean(measured.velocity[:, there] ** 2)))
-    more = (MEASURED.tolerated * size / one) ** 2
-    least, most = more, 4.0 * (dof + more) + 1e3
-    limit = brentq(lambda sum_: _tail(sum_, dof, more) - MEASURED.level, 0.0, 10.0 * most)
-    detectable = brentq(lambda shift: _tail(limit, dof, shift) - POWER.share, least, most)
-    *farthest, difference = _farthest(measured, k * off)
-    found: dict[str, Any] = {
-        "measured_flow_chi_squared": squares / unit,
-        "measured_flow_expected": dof + more,
-        "measured_flow_expected_std": math.sqrt(2.0 * (dof + 2.0 * more)),
-        "measured_flow_p_value": _tail(squares / unit, dof, more),
-        "measured_flow_determined": determined,
-        "measured_flow_detectable_m_s": one * math.sqrt(detectable),
-        "measured_flow_farthest_m": farthest,
-        "measured_flow_difference_m_s": difference,
-    }
-    if measured.scale_std > 0.0:
-        variance = 1.0 / precision + (k / precision) ** 2 * float(along @ covariance @ along)
-        free = max(measured.scale_std**2 - variance, 0.0)
-        std = math.sqrt(variance)
-        reach = float(ndtri(0.5 + 0.5 * confidence)) * std
-        chance = 2.0 * float(norm.sf(abs(k - 1.0) / math.sqrt(free))) if free > 0.0 else 1.0
-        sigmas = detectable_sigmas(0.5 * MEASURED.level)
-        found |= {
-            "measured_flow_scale": k,
-            "measured_flow_scale_interval": [k - reach, k + reach],
-            "measured_flow_scale_std": std,
-            "measured_flow_scale_p_value": chance,
-            "measured_flow_scale_detectable": sigmas * math.sqrt(free),
-        }
-    return found
-
-
-def _tail(value: float, dof: float, shift: float) -> float:
-    """Return the chance of a noncentral chi squared above a value."""
-    from scipy.stats import ncx2, norm
-
-    # Where its noncentrality is large it is normal, and its series takes long.
-    if shift > 1e4:
-        return float(norm.sf((value - dof - shift) / math.sqrt(2.0 * (dof + 2.0 * shift))))
-    return float(ncx2.sf(value, dof, shift))
-
-
-def _of_difference(measured: MeasuredFlow, flow: Floats, k: float, precision: float) -> Floats:
-    """Return the quadratic form of a change of the flow in the sum of squares of the vectors."""
-    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
-    power = float(along @ flow.ravel())
-    found = measured._curvature(flow, k, math.inf)
-    share = 2.0 / precision - power / precision**2
-    return np.asarray(found - k**2 * share * np.outer(along, along))
-
-
-def _farthest(measured: MeasuredFlow, off: Floats) -> tuple[float, float, float]:
-    """Return where two flows differ most among the measured nodes, and by how much."""
-    spline = measured.spline
-    values = spline.values(off.reshape(-1, spline.rows, spline.columns), measured.x, measured.y)
-    # Of a flow that changes, the rms over time: the modes have amplitudes of unit rms.
-    size = np.where(np.isfinite(measured.velocity[0]), np.hypot.reduce(values), -1.0)
-    row, column = np.unravel_index(int(size.argmax()), size.shape)
-    return float(measured.x[column]), float(measured.y[row]), float(size[row, column])

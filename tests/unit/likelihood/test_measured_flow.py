@@ -16,11 +16,10 @@ from scipy.optimize import minimize_scalar
 import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.criteria import MODEL_CHECK, agreement_criteria
-from driftwalk.likelihood.check.measured import best_placement
+from driftwalk.likelihood.check.measured import agreement_facts, best_placement
 from driftwalk.likelihood.measured_flow import (
     MEASURED,
     MeasuredFlow,
-    agreement_facts,
     measured_flow,
 )
 from driftwalk.likelihood.preparation import estimate_of, prepare, spline_of
@@ -199,7 +198,7 @@ def test_a_scale_that_is_off_is_found_and_leaves_the_drag_alone() -> None:
 def test_the_statistic_of_agreement_has_its_distribution(monkeypatch: pytest.MonkeyPatch) -> None:
     """P values of flows and scales that are drawn as the fit takes them are uniform."""
     exact = MEASURED._replace(tolerated=0.0)
-    monkeypatch.setattr("driftwalk.likelihood.measured_flow.MEASURED", exact)
+    monkeypatch.setattr("driftwalk.likelihood.check.measured.MEASURED", exact)
     generator = np.random.default_rng(3)
     one = read(of_fit(1e-3), flow_error_m_s=1e-3)
     size, shape = one.spline.size, fitted(SECONDS)["coefficient"].shape
