@@ -9,9 +9,8 @@ its orientation is counted clockwise.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,18 +22,12 @@ from driftwalk.likelihood.interval_inflation import (
     parameter_facts,
 )
 from driftwalk.likelihood.law.search import evidence_of
-from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, inverse, require_mode
-from driftwalk.likelihood.preparation import Estimate
-from driftwalk.likelihood.prior import Prior
+from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, inverse, require_mode, thinned
+from driftwalk.likelihood.preparation import Estimate, PreparedRecordings
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.spline import Spline
 from driftwalk.schema.answers.facts import is_open
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from driftwalk.model import Study
 
 LEFT_OUT_NATS = 18.0
 """Least loss of log likelihood by a sample that the filter leaves out, in closed form, as it is 6
@@ -42,9 +35,9 @@ standard deviations from its prediction: so a fit cannot gain by leaving samples
 
 
 def angle_given_facts(
-    passes: Passes, prior: Prior, mode: Mode, restricted: Restricted, study: Study
+    ready: PreparedRecordings, search: ModeSearch, mode: Mode, restricted: Restricted
 ) -> dict[str, Any]:
-    """Fit once more with the angle as an input (`passes`), and compare.
+    """Fit once more with the angle as an input, and compare.
 
     Returns ``drag_coefficient_angle_given`` with its interval, and ``angle_disagreement_std``: the
     difference of the two ln C_d in combined standard deviations, NaN where the second fit has no
@@ -53,16 +46,18 @@ def angle_given_facts(
     found = restricted.point
     known = {**found.fixed, **found.opened}
     start = replace(found, log_lever=None, log_angle_noise=None, opened={}, fixed=known)
+    passes = thinned(ready.with_angle("given").passes)
+    given = ModeSearch(
+        replace(passes, layers=search.passes.layers), search.prior, search.iterations
+    )
     try:
-        search = ModeSearch(passes, prior, study.fit.iterations)
-        other = require_mode(search.find(start, mode.weights, held=FROM_NEAR))
-        again = restricted_drag(search, other, intensity=False)
+        other = require_mode(given.find(start, mode.weights, held=FROM_NEAR))
+        again = restricted_drag(given, other, intensity=False)
         covariance = parameter_covariance(other, again)
         own = parameter_covariance(mode, restricted)
         apart = abs(again.point.log_drag - found.log_drag)
-        facts = parameter_facts(
-            again.point, open_where_undetermined(covariance, other, again), study
-        )
+        stated = open_where_undetermined(covariance, other, again)
+        facts = parameter_facts(again.point, stated, ready.study)
         disagreement = apart / math.sqrt(covariance[0, 0] + own[0, 0])
     except BREAKDOWN:
         return {"angle_disagreement_std": math.nan}
@@ -91,11 +86,6 @@ def spin_correlation(coefficients: Floats, passes: Passes) -> float:
         size = float(np.sqrt((spin**2).mean() * (vorticity**2).mean()))
         found = float((spin * vorticity).mean()) / size if size > 0.0 else 0.0
     return found if math.isfinite(found) else 0.0
-
-
-def negated(recordings: Sequence[xr.Dataset]) -> list[xr.Dataset]:
-    """Return recordings with the orientation counted the other way round."""
-    return [one.assign(theta=-one["theta"]) for one in recordings]
 
 
 def log_evidence(estimate: Estimate) -> float:

@@ -5,22 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.progress import StagedProgress, ignore_progress, share_of_search
+from driftwalk.core.progress import StagedProgress, ignore_progress
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
-from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.check.criteria import agreement_criteria
+from driftwalk.likelihood.check.measured import agreement_facts
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interaction.glued import (
     GLUED,
     EarlierFit,
     earlier_prior,
-    estimate_before,
-    first_glued_point,
+    glued_start,
     glued_stirring,
     glued_study,
 )
@@ -31,8 +32,8 @@ from driftwalk.likelihood.interval_inflation import (
     parameter_facts,
     with_mended_frames,
 )
+from driftwalk.likelihood.law.candidate_laws import MODES
 from driftwalk.likelihood.law.flow_modes import (
-    FlowModes,
     find_flow_modes,
     modes_at,
     require_one_flow,
@@ -41,30 +42,29 @@ from driftwalk.likelihood.law.flow_modes import (
 from driftwalk.likelihood.law.force_law import Assumptions, assumptions_of, side_slopes, stated_drag
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
-from driftwalk.likelihood.law.shape_changes import ShapeChange, shape_facts
-from driftwalk.likelihood.measured_flow import agreement_facts, contradictions
+from driftwalk.likelihood.law.shape_changes import shape_change, shape_facts
 from driftwalk.likelihood.newton import (
     EXCERPT,
     FROM_ANOTHER,
     FROM_THINNED,
-    WORK,
     Mode,
     ModeSearch,
-    Passed,
     Tell,
-    pieces,
+    converged,
     require_mode,
     thinned,
-    work_of_pass,
+    usual_work,
+    work_listener,
 )
 from driftwalk.likelihood.preparation import (
     AngleUse,
     Estimate,
     PreparedRecordings,
     as_list,
+    estimate_of,
     prepare,
 )
-from driftwalk.likelihood.prior import PRIOR
+from driftwalk.likelihood.prior import PRIOR, Weights
 from driftwalk.likelihood.refuse import (
     BREAKDOWN,
     reason_of_no_solution,
@@ -73,7 +73,6 @@ from driftwalk.likelihood.refuse import (
 )
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import build_fit, law_facts, visited_shares, whiteness_of
-from driftwalk.likelihood.spline import Spline
 from driftwalk.likelihood.start import Starts, first_points, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema.answers.facts import texts
@@ -151,67 +150,65 @@ def fit_motion(
     """
     from driftwalk.model import Study
 
-    chosen = study if study is not None else Study()
+    chosen = study or Study()
     if earlier is not None:
         chosen = glued_study(chosen, earlier.fit)
     # Not a decorator, which would be one frame more between a call and the kernel.
     with one_blas_thread():
         ready = prepare(as_list(recordings), chosen, angle, body, flow)
-        before = None if earlier is None else estimate_before(earlier)
+        before = (
+            None if earlier is None else estimate_of(earlier.fit, earlier.recordings, body=None)
+        )
         require_one_flow(ready, before)
         if before is not None:
             ready = replace(ready, earlier=earlier_prior(ready, before))
-        passes = ready.passes
-        spline = passes.spline
-        starts = _starts(ready, spline, before)
+        passes, known = ready.passes, ready.earlier
+        starts = first_points(ready) if before is None else glued_start(ready, before)
         assumptions = _assumptions(ready, before)
-        staged = StagedProgress(
-            tell or ignore_progress, _usual_parts(passes, interaction=chosen.fit.interaction)
-        )
+        usual = usual_work(passes, interaction=chosen.fit.interaction)
+        staged = StagedProgress(tell or ignore_progress, usual)
         reason = reason_of_no_solution(ready.wall_share, ready.tracks, chosen)
         # The stages stay in one function: they share most of their variables.
         with solved(reason):
-            passed = _work_listener(staged, _usual_search(passes))
+            passed = work_listener(staged, usual["likelihood"])
             search = ModeSearch(passes, ready.prior, chosen.fit.iterations, passed)
-            wanted, known = chosen.fit.flow_modes, ready.earlier
-            weights = first_weights(ready.tracks, spline) if known is None else known.weights
+            wanted = chosen.fit.flow_modes
+            weights = first_weights(ready.tracks, passes.spline) if known is None else known.weights
             modes, begin = find_flow_modes(search, starts.paper, weights, wanted), starts
-            done = False
-            while not done:
+            while True:
                 if modes.start is not None:
-                    search = with_layers(search, modes.layers)
-                    assumptions = replace(
-                        assumptions, opened={**assumptions.opened, **modes.opened}
-                    )
-                    begin, weights = Starts(modes.start, (modes.start,)), modes.weights or weights
-                laws = _law_search(search, assumptions, ready)
+                    point, weights = modes.start.point, modes.start.weights
+                    search, begin = with_layers(search, point.layers), Starts(point, (point,))
+                    of_modes = {name: point.opened[name] for name in MODES if name in point.opened}
+                    assumptions = replace(assumptions, opened={**assumptions.opened, **of_modes})
+                # Of a fast camera the law is searched on samples that are further apart.
+                few = replace(search, passes=thinned(search.passes))
+                laws = LawSearch(few, assumptions, partial(ready.undisturbed, EXCERPT.interval_s))
                 law = laws.find(begin, weights)
-                whole = law if laws.search is search else _of_all_samples(law, search)
-                if whole is None:
-                    laws = LawSearch(search, assumptions, ready.undisturbed)
-                    whole = laws.find(begin, weights)
-                law = whole
-                done = wanted == "none" or modes.start is not None
-                if not done:
-                    # Under the right law the line may stand out that did not under the paper's.
-                    shape = laws.confounders.shape_change(law.base)
-                    modes = modes_at(laws.search, law.base, shape, wanted)
-                    done = modes.start is None
-            passes = search.passes
+                if few.passes is not search.passes:
+                    whole = _of_all_samples(law, search)
+                    if whole is None:
+                        laws = LawSearch(search, assumptions, ready.undisturbed)
+                        whole = laws.find(begin, weights)
+                    law = whole
+                if wanted == "none" or modes.start is not None:
+                    break
+                # Under the right law the line may stand out that did not under the paper's.
+                shape = shape_change(laws.selection.scores, law.base)
+                modes = modes_at(laws.search, law.base, shape, wanted)
+                if modes.start is None:
+                    break
             staged.begin("drag")
             law, restricted = _restricted(search, laws, law)
         require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, reason)
         with solved(reason):
-            innovations = passes.innovations(restricted.point)
-        if ready.angle == "state":
-            staged.begin("angle as given")
-        turning = _turning_facts(ready, starts, search, law.mode, restricted)
+            innovations = search.passes.innovations(restricted.point)
+        turning = _turning_facts(ready, starts, search, law.mode, restricted, staged)
         with solved(reason):
             parameters = _parameter_facts(search, law.mode, restricted, ready)
             for alternative in law.alternatives:
                 parameters = _with_alternative(parameters, search, alternative, ready)
-            shape = laws.confounders.shape_change(law.mode)
-        with solved(reason):
+            shape = shape_change(laws.selection.scores, law.mode)
             stirring = (
                 shared_stirring(ready, restricted.point, staged)
                 if before is None or earlier is None
@@ -227,7 +224,7 @@ def fit_motion(
             **whiteness_of(innovations)._asdict(),
             **ready.facts,
             **_search_facts(law, restricted),
-            **_measured_flow_facts(ready, law.mode, restricted),
+            **_measured_flow_facts(ready, law.mode.weights, restricted.point),
             "wetted_depth_m": chosen.wetted_depth_m,
         }
         fit = build_fit(ready, law, restricted, facts)
@@ -237,8 +234,8 @@ def fit_motion(
             *warnings_of(facts, shares, ready.intervals, block=chosen.block),
             *law.unsettled,
             *law.noted,
-            *contradictions(facts),
-            *_flow_warnings(modes, shape),
+            *(one.sentence for one in agreement_criteria(facts) if one.failed),
+            *(facts[one] for one in ("flow_modes_unsettled", "flow_shape_change") if one in facts),
         ]
         if law.left_out:
             names = " and ".join(law.left_out)
@@ -248,14 +245,6 @@ def fit_motion(
                 warning=("warning", texts(warnings))
             )
         )
-
-
-def _starts(ready: PreparedRecordings, spline: Spline, before: Estimate | None) -> Starts:
-    """Return where the search begins, for glued blocks at the fit of one block before."""
-    if before is None:
-        return first_points(ready, spline)
-    glued = first_glued_point(ready, before)
-    return Starts(glued, (glued,))
 
 
 def _recording_warnings(
@@ -268,14 +257,6 @@ def _recording_warnings(
     yield from of_stirring
     for recording, track in zip(ready.recordings, ready.tracks, strict=True):
         yield from jump_warnings(recording, body, track=track)
-
-
-def _flow_warnings(modes: FlowModes, shape: ShapeChange | None) -> Iterator[str]:
-    """Yield why no modes of the flow were fitted, and how its shape changes."""
-    if modes.unsettled:
-        yield modes.unsettled
-    if shape is not None and shape.significant:
-        yield shape.sentence
 
 
 def _restricted(
@@ -298,6 +279,7 @@ def _turning_facts(
     search: ModeSearch,
     mode: Mode,
     restricted: Restricted,
+    staged: StagedProgress,
 ) -> dict[str, Any]:
     """Return how the spin goes with the water's, and C_d with the orientation as an input."""
     facts: dict[str, Any] = {}
@@ -305,9 +287,8 @@ def _turning_facts(
         mean = starts.paper.mean_coefficients
         facts["spin_correlation"] = spin_correlation(mean, thinned(ready.passes))
     if ready.angle == "state":
-        given = thinned(ready.with_angle("given").passes)
-        given = replace(given, layers=search.passes.layers)
-        facts |= angle_given_facts(given, search.prior, mode, restricted, ready.study)
+        staged.begin("angle as given")
+        facts |= angle_given_facts(ready, search, mode, restricted)
     return facts
 
 
@@ -320,29 +301,15 @@ def _assumptions(ready: PreparedRecordings, before: Estimate | None) -> Assumpti
     return replace(found, opened={**found.opened, "hidden_share": GLUED.first_share})
 
 
-def _law_search(
-    search: ModeSearch, assumptions: Assumptions, ready: PreparedRecordings
-) -> LawSearch:
-    """Return the search of the law, of a fast camera on samples that are further apart."""
-    few = thinned(search.passes)
-    if few is search.passes:
-        return LawSearch(search, assumptions, ready.undisturbed)
-
-    def undisturbed() -> list[Series]:
-        return [one.thinned(EXCERPT.interval_s) for one in ready.undisturbed()]
-
-    return LawSearch(replace(search, passes=few), assumptions, undisturbed)
-
-
 def _of_all_samples(law: LawResult, search: ModeSearch) -> LawResult | None:
     """Return a law of thinned samples with the modes of all, None if its own does not converge."""
     mode, *alternatives = (
-        search.find(one.point, one.weights, held=FROM_THINNED)
+        converged(search.find(one.point, one.weights, held=FROM_THINNED))
         for one in (law.mode, *law.alternatives)
     )
-    if mode is None or not mode.converged:
+    if mode is None:
         return None
-    known = tuple(one for one in alternatives if one is not None and one.converged)
+    known = tuple(one for one in alternatives if one is not None)
     base = mode if law.base is law.mode else law.base
     noted = law.noted if len(known) == len(alternatives) else ()
     return replace(law, mode=mode, base=base, alternatives=known, noted=noted)
@@ -385,22 +352,16 @@ def _with_alternative(
 
 
 def _measured_flow_facts(
-    ready: PreparedRecordings, mode: Mode, restricted: Restricted
+    ready: PreparedRecordings, weights: Weights, point: Point
 ) -> dict[str, Any]:
     """Return how far the measured flow and the motion agree; nothing without a measured flow."""
     if ready.measured is None:
         return {}
-    sums = ready.passes.sums(restricted.point, noise="without")
+    sums = ready.passes.sums(point, noise="without")
     across, own = sums.information[:-1, -1], sums.information[-1, -1] + PRIOR.log_drag_std**-2
-    return agreement_facts(
-        ready.measured,
-        restricted.point.coefficients,
-        sums.information[:-1, :-1] - np.outer(across, across) / own,
-        smoothness=ready.prior.matrix(mode.weights),
-        factors=ready.prior.factors(mode.weights, len(ready.measured.own)),
-        determined=mode.weights.determined,
-        confidence=ready.study.fit.confidence,
-    )
+    of_motion = sums.information[:-1, :-1] - np.outer(across, across) / own
+    confidence = ready.study.fit.confidence
+    return agreement_facts(ready.prior, weights, point.coefficients, of_motion, confidence)
 
 
 def _search_facts(law: LawResult, restricted: Restricted) -> dict[str, Any]:
@@ -445,39 +406,4 @@ def check_fit(
     """
     from driftwalk.model import Study
 
-    chosen = study if study is not None else Study()
-    require_one_flow(prepare(as_list(recordings), chosen, angle, body, flow))
-
-
-def _usual_search(passes: Passes) -> float:
-    """Return the work of a search that ends where most do, in samples."""
-    few = pieces(passes)
-    whole = work_of_pass(passes)
-    if few is None:
-        return (WORK.from_afar + WORK.score_tests) * whole
-    near = WORK.of_pieces * work_of_pass(replace(passes, series=few))
-    return near + (WORK.from_pieces + WORK.score_tests) * whole
-
-
-def _usual_parts(passes: Passes, *, interaction: bool) -> dict[str, float]:
-    """Return the work of each stage of a fit, in samples."""
-    whole = work_of_pass(passes)
-    parts = {"likelihood": _usual_search(passes), "drag": WORK.restricted * whole}
-    if passes.body.orientation == "state":
-        parts["angle as given"] = WORK.angle_given * whole
-    if interaction:
-        parts["shared stirring"] = WORK.shared_stirring * whole
-    return parts
-
-
-def _work_listener(staged: StagedProgress, usual: float) -> Passed:
-    """Return a listener to the work of the search, whose length is unknown beforehand."""
-    said, done = staged.stage("likelihood"), 0.0
-
-    def passed(work: float) -> None:
-        nonlocal done
-        done += work
-        said(share_of_search(done / usual), 1)
-
-    staged.begin("likelihood")
-    return passed
+    require_one_flow(prepare(as_list(recordings), study or Study(), angle, body, flow))

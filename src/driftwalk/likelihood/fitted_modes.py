@@ -97,12 +97,10 @@ def _frequencies(point: Point) -> list[float]:
     return [*pulses, *([point.number("mode_frequency")] if point.layers > 1 else [])]
 
 
-def strength_variables(
-    point: Point, series: Series
-) -> tuple[dict[str, Any], dict[str, Any], dict[str, str]]:
-    """Return variables, coordinates and attributes of the strength of a fitted flow in time."""
+def strength_variables(point: Point, series: Series) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return variables and attributes of the strength of a fitted flow in time."""
     if not any(point.number(name) for name in (*STRENGTHS, *PULSES)):
-        return {}, {}, {}
+        return {}, {}
     whole = replace(series, time=np.array([0.0, series.span]))
     slow = replace(point, opened={**point.opened, **dict.fromkeys(PULSES, 0.0)})
     words: dict[str, str] = {}
@@ -111,7 +109,7 @@ def strength_variables(
     except InputError as error:
         words["flow_strength_left_out"] = str(error)
         if point.layers > 1 or not any(point.number(name) for name in STRENGTHS):
-            return {}, {}, words
+            return {}, words
         point, frames = slow, flow_frames(whole, slow)
     assert frames is not None
     time, strength = frames.time, frames.strength[0]
@@ -121,17 +119,14 @@ def strength_variables(
         rest = layer_strengths(replace(series, time=whole.time[-1:]), slow)
         time = np.append(time, time[-1] + time[1])
         strength = np.append(strength, 1.0 if rest is None else rest[0])
-    return (
-        {"flow_strength": ("strength_time", strength)},
-        {"strength_time": ("strength_time", time)},
-        {"flow_strength_repeat": frames.repeat, **words},
-    )
+    data = {"flow_strength": ("strength_time", strength), "strength_time": ("strength_time", time)}
+    return data, {"flow_strength_repeat": frames.repeat, **words}
 
 
 def mode_variables(
     point: Point, series: Series, spline: Spline, grid: Grid, count: Floats
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the variables of the modes and their coordinates; `count` as in the fit."""
+) -> dict[str, Any]:
+    """Return the variables of the modes; `count` as in the fit."""
     fields = np.stack([spline.values(one, grid.x, grid.y) for one in point.coefficients])
     seen = count >= 3
     speeds = np.sqrt((fields**2).sum(axis=1)[:, seen].mean(axis=-1))
@@ -140,18 +135,15 @@ def mode_variables(
         time = np.linspace(0.0, 1.0 / point.number("mode_frequency"), FRAMES_PER_PERIOD + 1)
         found = mode_amplitudes(float(series.time[0]) + time, point)
         amplitudes = Amplitudes(time, found, "loop")
-    plane = ("flow_mode", "y", "x")
-    data = {
-        "mode_coefficient": (
-            ("flow_mode", "component", "knot_y", "knot_x"),
-            point.coefficients[1:],
-        ),
+    plane, knots = ("flow_mode", "y", "x"), ("flow_mode", "component", "knot_y", "knot_x")
+    return {
+        "mode_coefficient": (knots, point.coefficients[1:]),
         "u_mode": (plane, fields[1:, 0]),
         "v_mode": (plane, fields[1:, 1]),
         "mode_amplitude": (("flow_mode", "mode_time"), amplitudes.value),
         "mode_share": ("flow_mode", speeds[1:] / speeds[0]),
+        "mode_time": ("mode_time", amplitudes.time),
     }
-    return data, {"mode_time": ("mode_time", amplitudes.time)}
 
 
 def stored_coefficients(fit: xr.Dataset) -> Floats:

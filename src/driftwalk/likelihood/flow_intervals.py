@@ -202,12 +202,12 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
             attrs[f"{FIT_PREFIX}{name}"] = [float(end) for end in ends]
     x, y = fit["x"].values, fit["y"].values
     moving = stored_frames(fit) if interval is None else None
-    if intervals.steady and moving is not None:
-        attrs |= {"repeat": moving.repeat} if moving.repeat != "none" else {}
-        fields_in_time = moving_fields(fit, moving, _field_variables(fit))
-        return build_flow_field(x, y, time=moving.time, attrs=attrs, **fields_in_time)
     if intervals.steady:
-        return build_flow_field(x, y, attrs=attrs, **_field_variables(fit))
+        field = _field_variables(fit)
+        if moving is not None:
+            attrs |= {"repeat": moving.repeat} if moving.repeat != "none" else {}
+            field = {"time": moving.time, **moving_fields(fit, moving, field)}
+        return build_flow_field(x, y, attrs=attrs, **field)
     fields = [_field_variables(fit.isel(flow=index)) for index in range(fit.sizes["flow"])]
     if interval is not None:
         flow = intervals.flows[interval]

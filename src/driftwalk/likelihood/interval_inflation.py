@@ -115,8 +115,7 @@ def parameter_facts(
 
     confidence = study.fit.confidence
     interval = study.forces.force_interval_s
-    mass = study.block.mass_kg
-    intensity = mass**2 * math.exp(point.log_intensity)
+    intensity = study.block.mass_kg**2 * math.exp(point.log_intensity)
     normal = float(ndtri(0.5 + 0.5 * confidence))
     reach = normal * np.sqrt(np.diag(covariance))
     reach_of_drag = normal * _log_drag_std(point, covariance)

@@ -9,7 +9,6 @@ squares of the coefficients alone. See docs/explanation/likelihood.md.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -19,7 +18,6 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.units import in_percent
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.check.power import POWER, detectable_sigmas
 from driftwalk.likelihood.filter.parameters import Amplitudes
 from driftwalk.likelihood.measured_series import amplitudes_in, compressed
 from driftwalk.likelihood.spline import Spline, products
@@ -129,7 +127,7 @@ class MeasuredFlow:
         if self.scale_std > 0.0:
             value += 0.5 * ((k - 1.0) / self.scale_std) ** 2
         # As k goes with the inverse of the flow's size, ``determined ln k`` bends upwards along it.
-        bent = self._curvature(flow, k, precision + 2.0 * determined / k**2)
+        bent = self.curvature(flow, k, precision + 2.0 * determined / k**2)
         return value, k * pull.ravel(), bent
 
     def determined(self, coefficients: Floats, covariance: Floats, before: float) -> float:
@@ -140,7 +138,8 @@ class MeasuredFlow:
         size = len(curvature)
         return min(float((curvature * covariance[:size, :size]).sum()), float(self.rank))
 
-    def _curvature(self, flow: Floats, k: float, precision: float) -> Floats:
+    def curvature(self, flow: Floats, k: float, precision: float) -> Floats:
+        """Return the curvature at a flow (2 layers, n) and a scale that is known to a precision."""
         size = self.spline.size
         found = np.zeros((flow.size, flow.size))
         for component in range(len(flow)):
@@ -149,21 +148,19 @@ class MeasuredFlow:
         along = np.einsum("kab,kb->ka", self.normal, flow).ravel()
         return np.asarray(found - (k**2 / precision) * np.outer(along, along))
 
-    def stored(self) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-        """Return the variables, coordinates and attributes with which a fit holds it."""
+    def stored(self) -> tuple[dict[str, Any], dict[str, str]]:
+        """Return the variables and attributes with which a fit holds it."""
         on = ("measured_y", "measured_x")
-        data: dict[str, Any] = {
-            f"measured_{name}": (on, self.velocity[k]) for k, name in enumerate(NAMES)
-        }
-        data |= {f"measured_{name}_error": (on, self.error[k]) for k, name in enumerate(NAMES)}
-        coords = {"measured_y": ("measured_y", self.y), "measured_x": ("measured_x", self.x)}
+        data: dict[str, Any] = {"measured_y": (on[0], self.y), "measured_x": (on[1], self.x)}
         words = {"measured_flow": self.source, "measured_flow_errors": self.errors}
-        if self.amplitudes is not None:
+        for end, values in (("", self.velocity), ("_error", self.error)):
             for k, name in enumerate(NAMES):
-                for end, values in (("", self.velocity), ("_error", self.error)):
+                data[f"measured_{name}{end}"] = (on, values[k])
+                if self.amplitudes is not None:
                     data[f"measured_{name}_mode{end}"] = (("flow_mode", *on), values[k + 2 :: 2])
+        if self.amplitudes is not None:
             words["mode_repeat"] = self.amplitudes.repeat
-        return data, coords, words
+        return data, words
 
 
 def measured_flow(
@@ -283,12 +280,8 @@ def _least_squares(
     weight = np.where(np.isfinite(error), 1.0 / np.where(error > 0.0, error, np.inf) ** 2, 0.0)
     values = np.where(weight > 0.0, velocity, 0.0)
     normal = np.stack([products(one, along_x, along_y) for one in weight])
-    right = np.stack(
-        [
-            (along_y.T @ (one * value) @ along_x).ravel()
-            for one, value in zip(weight, values, strict=True)
-        ]
-    )
+    pairs = zip(weight, values, strict=True)
+    right = np.stack([(along_y.T @ (one * value) @ along_x).ravel() for one, value in pairs])
     own, rank, squares = np.zeros_like(right), 0, 0.0
     for k in range(2):
         spread, base = np.linalg.eigh(normal[k])
@@ -298,159 +291,3 @@ def _least_squares(
         off = values[k] - along_y @ own[k].reshape(spline.rows, spline.columns) @ along_x.T
         squares += float((weight[k] * off**2).sum())
     return _Solved(normal, right, own, rank, squares)
-
-
-def agreement_facts(
-    measured: MeasuredFlow,
-    coefficients: Floats,
-    information: Floats,
-    *,
-    smoothness: Floats,
-    factors: Floats,
-    determined: float,
-    confidence: float,
-) -> dict[str, Any]:
-    """Return how far the motion pulls the flow away from the measured one.
-
-    The fitted flow is compared with that of the vectors and the prior of smoothness alone, in
-    errors of the vectors. `information` is that of the motion on the coefficients, `smoothness` the
-    precision of one component under its prior, times one of the `factors` for each component.
-    """
-    from scipy.linalg import block_diag
-    from scipy.optimize import brentq
-    from scipy.special import ndtri
-    from scipy.stats import norm
-
-    flow = coefficients.reshape(len(measured.own), -1)
-    k, precision = measured.scale(coefficients, determined)
-    _, score, precise = measured.deviance(coefficients, determined)
-    score = score - ((factors[:, None] * flow) @ smoothness).ravel()
-    precise = precise + block_diag(*(factor * smoothness for factor in factors))
-    alone, covariance = np.linalg.inv(precise), np.linalg.inv(precise + information)
-    off = -alone @ score
-    form = _of_difference(measured, flow, k, precision)
-    squares = float(off @ form @ off)
-    # Two estimates of which one knows more: their difference has the difference of the covariances.
-    less = alone - covariance
-    spread = form @ less
-    mean = max(float(np.trace(spread)), 1e-6)
-    half_variance = max(float((spread * spread.T).sum()), 1e-12)
-    # A chi squared with the same mean and variance (Satterthwaite).
-    unit, dof = half_variance / mean, mean**2 / half_variance
-    # A random difference of the flows, as detailed as the knots, by which the sum grows by 1.
-    shift = float(((less @ form) * (form @ less @ form).T).sum())
-    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
-    along_x, along_y = measured.spline.design(measured.x, measured.y)
-    there = np.isfinite(measured.velocity[0])
-    bases = np.outer((along_y**2).sum(axis=1), (along_x**2).sum(axis=1))[there].mean()
-    one = math.sqrt(unit * float(bases) / max(shift, 1e-300))
-    size = math.sqrt(float(np.mean(measured.velocity[:, there] ** 2)))
-    more = (MEASURED.tolerated * size / one) ** 2
-    found: dict[str, Any] = {
-        "measured_flow_chi_squared": squares / unit,
-        "measured_flow_expected": dof + more,
-        "measured_flow_expected_std": math.sqrt(2.0 * (dof + 2.0 * more)),
-        "measured_flow_p_value": _tail(squares / unit, dof, more),
-        "measured_flow_determined": determined,
-    }
-    least, most = more, 4.0 * (dof + more) + 1e3
-    limit = brentq(lambda sum_: _tail(sum_, dof, more) - MEASURED.level, 0.0, 10.0 * most)
-    found["measured_flow_detectable_m_s"] = one * math.sqrt(
-        brentq(lambda shift: _tail(limit, dof, shift) - POWER.share, least, most)
-    )
-    place = _farthest(measured, k * off)
-    found |= {"measured_flow_farthest_m": list(place[:2]), "measured_flow_difference_m_s": place[2]}
-    if measured.scale_std > 0.0:
-        variance = 1.0 / precision + (k / precision) ** 2 * float(along @ covariance @ along)
-        free = max(measured.scale_std**2 - variance, 0.0)
-        std = math.sqrt(variance)
-        reach = float(ndtri(0.5 + 0.5 * confidence)) * std
-        chance = 2.0 * float(norm.sf(abs(k - 1.0) / math.sqrt(free))) if free > 0.0 else 1.0
-        found |= {
-            "measured_flow_scale": k,
-            "measured_flow_scale_interval": [k - reach, k + reach],
-            "measured_flow_scale_std": std,
-            "measured_flow_scale_p_value": chance,
-            "measured_flow_scale_detectable": detectable_sigmas(0.5 * MEASURED.level)
-            * math.sqrt(free),
-        }
-    return found
-
-
-def _tail(value: float, dof: float, shift: float) -> float:
-    """Return the chance of a noncentral chi squared above a value."""
-    from scipy.stats import ncx2, norm
-
-    # Where its noncentrality is large it is normal, and its series takes long.
-    if shift > 1e4:
-        return float(norm.sf((value - dof - shift) / math.sqrt(2.0 * (dof + 2.0 * shift))))
-    return float(ncx2.sf(value, dof, shift))
-
-
-def _of_difference(measured: MeasuredFlow, flow: Floats, k: float, precision: float) -> Floats:
-    """Return the quadratic form of a change of the flow in the sum of squares of the vectors."""
-    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
-    power = float(along @ flow.ravel())
-    found = measured._curvature(flow, k, math.inf)
-    share = 2.0 / precision - power / precision**2
-    return np.asarray(found - k**2 * share * np.outer(along, along))
-
-
-def _farthest(measured: MeasuredFlow, off: Floats) -> tuple[float, float, float]:
-    """Return where two flows differ most among the measured nodes, and by how much."""
-    spline = measured.spline
-    values = spline.values(off.reshape(-1, spline.rows, spline.columns), measured.x, measured.y)
-    # Of a flow that changes, the rms over time: the modes have amplitudes of unit rms.
-    size = np.where(np.isfinite(measured.velocity[0]), np.hypot.reduce(values), -1.0)
-    row, column = np.unravel_index(int(size.argmax()), size.shape)
-    return float(measured.x[column]), float(measured.y[row]), float(size[row, column])
-
-
-class Agreement(NamedTuple):
-    """One question to a measured flow."""
-
-    name: str
-    p_value: float
-    sentence: str
-    """The finding, where it is one."""
-    detectable: float
-    """Misfit that is found nine times in ten."""
-
-
-def agreement_tests(facts: Mapping[str, Any]) -> list[Agreement]:
-    """Return whether a measured flow and its scale are those that move the block."""
-    if "measured_flow_p_value" not in facts:
-        return []
-    x, y = facts["measured_flow_farthest_m"]
-    expected, std = facts["measured_flow_expected"], facts["measured_flow_expected_std"]
-    found = [
-        Agreement(
-            "measured flow",
-            facts["measured_flow_p_value"],
-            "the measured flow is not the one that moves the block: chi squared of their "
-            f"difference {facts['measured_flow_chi_squared']:.0f}, expected {expected:.0f} ± "
-            f"{std:.0f}; most at x = {x:.3g} m, y = {y:.3g} m, where they are "
-            f"{1e3 * facts['measured_flow_difference_m_s']:.2g} mm/s apart: is it mirrored, "
-            "shifted, of another setting of the pumps, or are its errors larger?",
-            facts["measured_flow_detectable_m_s"],
-        )
-    ]
-    if "measured_flow_scale_p_value" in facts:
-        off = facts["measured_flow_scale"] - 1.0
-        found.append(
-            Agreement(
-                "measured scale",
-                facts["measured_flow_scale_p_value"],
-                f"the measured flow is {in_percent(abs(off))} too "
-                f"{'fast' if off > 0.0 else 'slow'} for the motion "
-                f"(± {in_percent(facts['measured_flow_scale_std'], decimals=1)}): are its length "
-                "scale and frame interval right?",
-                facts["measured_flow_scale_detectable"],
-            )
-        )
-    return found
-
-
-def contradictions(facts: Mapping[str, Any]) -> list[str]:
-    """Return what in a measured flow contradicts the motion, in sentences."""
-    return [one.sentence for one in agreement_tests(facts) if one.p_value < MEASURED.level]

@@ -98,15 +98,10 @@ def with_modes(
 ) -> xr.Dataset:
     """Return a mean flow with its modes and their errors, shapes (2, modes, y, x)."""
     plane = ("mode", "y", "x")
-    return (
-        field.assign(
-            {f"{name}_mode": (plane, one) for name, one in zip("uv", velocity, strict=True)}
-            | {f"{name}_mode_error": (plane, one) for name, one in zip("uv", error, strict=True)}
-            | {"amplitude": (("mode", "frame"), amplitudes.value)}
-        )
-        .assign_coords(frame=amplitudes.time)
-        .assign_attrs(repeat=amplitudes.repeat)
-    )
+    data = {"frame": ("frame", amplitudes.time), "amplitude": (("mode", "frame"), amplitudes.value)}
+    for name, one, off in zip("uv", velocity, error, strict=True):
+        data |= {f"{name}_mode": (plane, one), f"{name}_mode_error": (plane, off)}
+    return field.assign(data).assign_attrs(repeat=amplitudes.repeat)
 
 
 def amplitudes_in(field: xr.Dataset) -> Amplitudes | None:

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats
-from driftwalk.core.progress import ignore_progress
+from driftwalk.core.progress import StagedProgress, ignore_progress, share_of_search
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
@@ -228,12 +228,11 @@ class ModeSearch:
     def find_from_afar(self, start: Point, weights: Weights) -> Mode | None:
         """Return the mode, of long recordings by way of the mode of pieces of them."""
         few = pieces(self.passes)
-        if few is not None:
-            near = self.of(few).coarse().find(start, weights)
-            if near is not None and near.converged:
-                mode = self.find(near.point, near.weights, held=FROM_ANOTHER)
-                if mode is not None and mode.converged:
-                    return mode
+        near = None if few is None else converged(self.of(few).coarse().find(start, weights))
+        if near is not None:
+            mode = converged(self.find(near.point, near.weights, held=FROM_ANOTHER))
+            if mode is not None:
+                return mode
         return self.find(start, weights)
 
 
@@ -242,6 +241,11 @@ def require_mode(mode: Mode | None) -> Mode:
     if mode is None:
         raise np.linalg.LinAlgError("the search broke down")
     return mode
+
+
+def converged(mode: Mode | None) -> Mode | None:
+    """Return a mode that is one; nothing where the search broke down or did not come to its end."""
+    return mode if mode is not None and mode.converged else None
 
 
 def _of_all(sums: Sums, count: int) -> Sums:
@@ -365,3 +369,31 @@ def pieces(passes: Passes) -> Sequence[Series] | None:
     # Each recording gives a piece, so of many short ones little is left out.
     few = sum(one.time.size for one in found)
     return found if EXCERPT.worth_factor * few <= total else None
+
+
+def usual_work(passes: Passes, *, interaction: bool) -> dict[str, float]:
+    """Return the work of each stage of a fit whose search ends where most do, in samples."""
+    whole, few = work_of_pass(passes), pieces(passes)
+    search = (WORK.from_afar + WORK.score_tests) * whole
+    if few is not None:
+        near = WORK.of_pieces * work_of_pass(replace(passes, series=few))
+        search = near + (WORK.from_pieces + WORK.score_tests) * whole
+    parts = {"likelihood": search, "drag": WORK.restricted * whole}
+    if passes.body.orientation == "state":
+        parts["angle as given"] = WORK.angle_given * whole
+    if interaction:
+        parts["shared stirring"] = WORK.shared_stirring * whole
+    return parts
+
+
+def work_listener(staged: StagedProgress, usual: float) -> Passed:
+    """Return a listener to the work of the search, whose length is unknown beforehand."""
+    said, done = staged.stage("likelihood"), 0.0
+
+    def passed(work: float) -> None:
+        nonlocal done
+        done += work
+        said(share_of_search(done / usual), 1)
+
+    staged.begin("likelihood")
+    return passed

@@ -16,7 +16,7 @@ from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text_files import parse_json
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.parameters import Point, body_of
+from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.filter.series import (
     FILTER,
     ORIENTED_SHARE,
@@ -125,15 +125,16 @@ class PreparedRecordings:
     @property
     def passes(self) -> Passes:
         """The filter over these recordings."""
-        body, spline = body_of(self.study, self.angle), spline_of(self.study)
+        body, flows = Body(self.study, self.angle), len(self.intervals.labels)
         layers = 1 if self.measured is None else self.measured.layers
-        return Passes(self.series, body, spline, len(self.intervals.labels), layers)
+        return Passes(self.series, body, spline_of(self.study), flows, layers)
 
-    def undisturbed(self) -> list[Series]:
+    def undisturbed(self, interval: float = 0.0) -> list[Series]:
         """Return the series without what near the wall, or after a mistake, is no free motion.
 
         Left out as well are intervals with a corner within half a side of the wall, and those next
-        to a gap: a sample or a frame that is missing may be a mistake of its own.
+        to a gap: a sample or a frame that is missing may be a mistake of its own. The samples are
+        about an interval [s] apart.
         """
         outline, block = outline_of(self.study.tank.to_arena()), self.study.block
         found = []
@@ -148,7 +149,7 @@ class PreparedRecordings:
             gaps = np.flatnonzero(np.diff(one.time) > 1.5 * float(np.median(np.diff(one.time)))) + 1
             for later in range(FILTER.settling_samples + 1):
                 left_out[np.minimum(gaps + later, one.time.size - 1)] = True
-            found.append(replace(one, excluded=left_out.astype(np.uint8)))
+            found.append(replace(one, excluded=left_out.astype(np.uint8)).thinned(interval))
         return found
 
     def with_angle(self, angle: str) -> PreparedRecordings:
@@ -235,7 +236,7 @@ def prepare(
                 "recordings one by one"
             )
     # One use of the angle for all recordings, as they share the noise of the angle.
-    used_angle = use_angle(many, tracks, wanted) if has_heading(study, wanted) else "none"
+    used_angle = use_angle(many, tracks, study, wanted)
     series = series_of(parts, study, used_angle, places)
     # A tank that was fitted to the positions touches them: say so before the wall share does.
     arena = read_arena(str(many[0].attrs.get("arena", "{}")))
@@ -298,20 +299,17 @@ NO_HEADING = "no heading"
 """Use of the angle in a stored fit of a disc."""
 
 
-def has_heading(study: Study, wanted: str) -> bool:
-    """Return whether the body has a heading; refuse the wish to use that of a disc."""
-    if study.block.body().symmetry:
-        return True
-    if wanted in ("state", "given"):
-        raise InputError(
-            f"a disc has no heading: leave out {argument_text('angle', wanted)}; its drag is the "
-            "same at every angle, and the recorded one is not used"
-        )
-    return False
-
-
-def use_angle(many: Sequence[xr.Dataset], tracks: Sequence[Track], wanted: str) -> str:
+def use_angle(
+    many: Sequence[xr.Dataset], tracks: Sequence[Track], study: Study, wanted: str
+) -> str:
     """Return how orientations are used: "state", "given" or "none"."""
+    if not study.block.body().symmetry:
+        if wanted in ("state", "given"):
+            raise InputError(
+                f"a disc has no heading: leave out {argument_text('angle', wanted)}; its drag is "
+                "the same at every angle, and the recorded one is not used"
+            )
+        return "none"
     if wanted not in ("auto", "state", "given", "none"):
         raise InputError(f"angle must be 'auto', 'state', 'given' or 'none', got {wanted!r}")
     shares = [float(np.isfinite(track.theta).mean()) if track.turns else 0.0 for track in tracks]
@@ -352,8 +350,7 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     from driftwalk.model import apply_overrides, parse_study
 
     fit = require_fit(fit)
-    study = parse_study(fit.attrs["study"])
-    study = apply_overrides(study, fitted_law(fit))
+    study = apply_overrides(parse_study(fit.attrs["study"]), fitted_law(fit))
     ready = prepare(recordings, study, fit.attrs["angle"], body, stored_flow(fit))
     if ready.samples != int(fit["samples"]):
         raise InputError(

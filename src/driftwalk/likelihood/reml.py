@@ -43,7 +43,6 @@ from driftwalk.likelihood.filter.series import FILTER, Series
 from driftwalk.likelihood.law.candidate_laws import INTENSITIES
 from driftwalk.likelihood.newton import Mode, ModeSearch, known_numbers_variance
 from driftwalk.likelihood.refuse import cholesky
-from driftwalk.likelihood.spline import Spline
 
 
 class RemlPolicy(NamedTuple):
@@ -300,12 +299,13 @@ def due_share(passes: Passes, prior: Floats, point: Point) -> float:
 
 
 def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other: Floats) -> None:
-    body, spline = passes.body, passes.spline
+    study, spline = passes.body.study, passes.spline
     # Many samples within a tenth of a second tell the same.
     states, time = passes.states(series, point)[:: series.pooled], series.time[:: series.pooled]
     excluded = np.maximum.reduceat(series.excluded, np.arange(0, series.time.size, series.pooled))
     mean = point.coefficients.reshape(-1, spline.size)[:2]
-    scale = 0.5 * body.water_density * body.side * body.depth / body.mass
+    block, density = study.block, study.water.density_kg_m3
+    scale = 0.5 * density * block.side_m * study.wetted_depth_m / block.mass_kg
     step = np.diff(time, prepend=time[0])
     seen = np.asarray(np.isfinite(states).all(axis=1))
     states = np.where(seen[:, None], states, 0.0)
@@ -313,7 +313,8 @@ def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other
     memory = np.zeros(spline.size)
     for begin in range(0, time.size, SAMPLES_AT_ONCE):
         part = slice(begin, begin + SAMPLES_AT_ONCE)
-        rows = _bases(spline, states[part, 0], states[part, 1])
+        along_x, along_y = spline.design(states[part, 0], states[part, 1])
+        rows = (along_y[:, :, None] * along_x[:, None, :]).reshape(len(along_x), -1)
         slip = np.hypot(*(mean @ rows.T - states[part, 2:].T))
         # Along the slip the drag k |w| w pulls with 2 k |w|, across it with k |w|: their mean.
         rate = 1.5 * scale * math.exp(point.log_drag) * slip
@@ -336,9 +337,3 @@ def remembered(rows: Floats, turns: Floats, lost: Bools, memory: Floats) -> tupl
         kept[k] = share[k] * memory + (1.0 - share[k]) * row
         memory = np.zeros_like(memory) if lost[k] else left[k] * memory + (1.0 - left[k]) * row
     return kept, memory
-
-
-def _bases(spline: Spline, x: Floats, y: Floats) -> Floats:
-    """Return all basis functions at places, shape (n, coefficients of one component)."""
-    along_x, along_y = spline.design(x, y)
-    return (along_y[:, :, None] * along_x[:, None, :]).reshape(x.size, -1)

@@ -46,19 +46,6 @@ PARAMETERS: Final = (
 )
 """The last two with the angle in the state only."""
 
-WORDS: Final = (
-    *("angle", "source", "simulated_recording"),
-    *("force_law", "force_law_stated", "drag_law", "drag_law_stated"),
-)
-"""Facts in words, which are attributes."""
-REASONS: Final = (
-    "law_unsettled",
-    "flow_shape_change",
-    "flow_modes_unsettled",
-    "stretches_unsettled",
-)
-"""The same where there is anything to say."""
-
 
 class Whiteness(NamedTuple):
     """How far the innovations are what the model says: independent, of the stated covariance."""
@@ -143,19 +130,19 @@ def build_fit(
         uncertainty = open_where_undetermined(uncertainty, mode, restricted)
     noises = 1 + len(mode.point.noises)
     names = np.array([*PARAMETERS[:noises], *mode.point.opened], dtype=object)
+    # A variable that is named like its dimension is a coordinate.
     data: dict[str, Any] = {
         **(flows[0] if intervals.steady else _stacked(flows)),
         "covariance": (("log_parameter", "other_log_parameter"), uncertainty),
         "profile_deviance": ("profile", [one.deviance - least for one in profiles]),
         "profile_half_log_determinant": ("profile", determinant),
-    }
-    coords: dict[str, Any] = {
         "y": ("y", grid.y),
         "x": ("x", grid.x),
         "component": ("component", np.array(["u", "v"], dtype=object)),
         "log_parameter": ("log_parameter", names),
         "other_log_parameter": ("other_log_parameter", names),
         "profile": ("profile", [math.exp(one.log_drag) for one in profiles]),
+        **number_variables(restricted.point, law),
     }
     facts = {
         **facts,
@@ -164,33 +151,28 @@ def build_fit(
         "cell_size_m": grid.cell_size,
     }
     if not intervals.steady:
-        coords["flow"] = ("flow", np.array(intervals.labels, dtype=object))
+        data["flow"] = ("flow", np.array(intervals.labels, dtype=object))
         data["interval_flow"] = ("flow_interval", np.array(intervals.flows, dtype=np.int32))
         facts["switching_times_s"] = list(intervals.times)
         facts["recording_start_s"] = float(ready.tracks[0].time[0])
     if restricted.point.layers > 1:
         count = flows[0]["count"][1]
-        modes, of_modes = mode_variables(restricted.point, ready.series[0], spline, grid, count)
-        data, coords = data | modes, coords | of_modes
-    strength, strength_at, strength_words = strength_variables(restricted.point, ready.series[0])
-    data, coords = data | strength, coords | strength_at
-    numbers, names_of, _ = fit_parts(facts)
-    found, names_found = number_variables(restricted.point, law)
-    words: dict[str, Any] = {}
+        data |= mode_variables(restricted.point, ready.series[0], spline, grid, count)
+    strength, words = strength_variables(restricted.point, ready.series[0])
+    data |= strength
     if ready.measured is not None:
-        more, places, words = ready.measured.stored()
-        found, names_found = found | more, names_found | places
+        measured, of_measured = ready.measured.stored()
+        data, words = data | measured, words | of_measured
+    numbers, coords, _ = fit_parts(facts)
     attrs: dict[str, Any] = {
         "kind": "fit",
         "schema_version": KINDS["fit"].version,
         "arena": study.tank.to_arena_json(),
-        **{name: facts[name] for name in WORDS},
-        **{name: facts[name] for name in REASONS if name in facts},
+        **{one.name: facts[one.name] for one in KINDS["fit"].attributes if one.name in facts},
         "study": study.to_toml(),
-        **strength_words,
         **words,
     }
-    return xr.Dataset(data | found | numbers, coords | names_found | names_of, attrs)
+    return xr.Dataset(data | numbers, coords, attrs)
 
 
 def law_facts(law: LawResult, assumptions: Assumptions) -> dict[str, Any]:
@@ -216,24 +198,22 @@ def law_facts(law: LawResult, assumptions: Assumptions) -> dict[str, Any]:
     return facts
 
 
-def number_variables(point: Point, law: LawResult) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return variables and coordinates with the numbers of the law, and what was tested."""
+def number_variables(point: Point, law: LawResult) -> dict[str, Any]:
+    """Return variables with the numbers of the law, and what was tested."""
     values = {**point.fixed, **point.opened}
     data: dict[str, Any] = {
         "number_value": ("number", np.array(list(values.values()), dtype=np.float64)),
         "number_opened": ("number", np.array([name in point.opened for name in values], bool)),
+        "number": ("number", np.array(list(values), dtype=np.str_)),
         "filter_drag_coefficient": ((), np.float64(math.exp(point.log_drag))),
         "law_log_evidence": ("law", np.array(list(law.evidence.values()), dtype=np.float64)),
-    }
-    coords: dict[str, Any] = {
-        "number": ("number", np.array(list(values), dtype=np.str_)),
         "law": ("law", np.array(list(law.evidence), dtype=np.str_)),
     }
     if law.tests is not None:
         data["departure_estimate"] = ("departure", law.tests.estimate)
         data["departure_std"] = ("departure", law.tests.std)
-        coords["departure"] = ("departure", np.array(law.tests.names, dtype=np.str_))
-    return data, coords
+        data["departure"] = ("departure", np.array(law.tests.names, dtype=np.str_))
+    return data
 
 
 def _stacked(flows: list[dict[str, Any]]) -> dict[str, Any]:

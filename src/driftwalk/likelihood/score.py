@@ -143,8 +143,7 @@ def _parameter_score(fit: xr.Dataset, name: str, truth: float, interval: int) ->
             f"the true {name} is {truth!r}: a positive number is needed, errors are relative to it"
         )
     facts = facts_of(fit)
-    value = float(facts[name])
-    low, high = facts[f"{name}_interval"]
+    value, (low, high) = float(facts[name]), facts[f"{name}_interval"]
     if name == "force_std_N" and "flow_force_std" in fit:
         flow = fitted_intervals(fit).flows[interval]
         value, low, high = (

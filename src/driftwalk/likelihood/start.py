@@ -44,7 +44,7 @@ class InitialValuesPolicy(NamedTuple):
 INITIAL_VALUES: Final = InitialValuesPolicy()
 
 
-def first_points(ready: PreparedRecordings, spline: Spline) -> Starts:
+def first_points(ready: PreparedRecordings) -> Starts:
     """Return the first values under each law.
 
     A floating body follows the water: the push of the water explains what Eq. 4 takes for slip.
@@ -53,9 +53,9 @@ def first_points(ready: PreparedRecordings, spline: Spline) -> Starts:
     """
     from driftwalk.model import apply_overrides
 
-    paper = first_point(ready, spline)
+    paper = first_point(ready)
     tracer = apply_overrides(ready.study, {"flow.inertia": "none"})
-    flow = _first_coefficients(ready, tracer, spline)
+    flow = _first_coefficients(ready, tracer)
     floating = [
         replace(paper, coefficients=flow, log_intensity=paper.log_intensity + math.log(one))
         for one in INITIAL_VALUES.floating_intensity_factors
@@ -63,7 +63,7 @@ def first_points(ready: PreparedRecordings, spline: Spline) -> Starts:
     return Starts(paper, tuple(floating))
 
 
-def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
+def first_point(ready: PreparedRecordings) -> Point:
     """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`."""
     study, tracks = ready.study, ready.tracks
     cameras = [recorded_camera(track, study, position_quantum=0.0) for track in tracks]
@@ -74,7 +74,7 @@ def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
     # small one makes the filter lose the track.
     unrest = 0.1 * typical_speed(tracks) ** 3 / study.block.side_m
     point = Point(
-        _first_coefficients(ready, study, spline),
+        _first_coefficients(ready, study),
         log_drag=math.log(PRIOR.drag),
         log_intensity=math.log(unrest),
         log_noise=_log_noise([camera.position_noise for camera in cameras], least),
@@ -91,8 +91,9 @@ def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
     )
 
 
-def _first_coefficients(ready: PreparedRecordings, study: Study, spline: Spline) -> Floats:
+def _first_coefficients(ready: PreparedRecordings, study: Study) -> Floats:
     """Return the first coefficients of the flow, of each flow, or of its modes."""
+    spline = ready.passes.spline
     if ready.intervals.steady:
         coefficients = _flow_coefficients(ready.tracks[0], study, spline, ready.measured)
         if ready.measured is None or ready.measured.layers == 1:
@@ -104,12 +105,12 @@ def _first_coefficients(ready: PreparedRecordings, study: Study, spline: Spline)
         ]
         return np.stack([coefficients, *modes])
     # Each flow begins with the longest stretch that was recorded in it.
-    longest: dict[int, Track] = {}
-    for (flow, _), part in zip(ready.places, ready.parts, strict=True):
-        if flow not in longest or part.time.size > longest[flow].time.size:
-            longest[flow] = part
-    flows = range(len(ready.intervals.labels))
-    return np.stack([_flow_coefficients(longest[k], study, spline) for k in flows])
+    parts = list(zip(ready.places, ready.parts, strict=True))
+    longest = [
+        max((part for (flow, _), part in parts if flow == k), key=lambda one: one.time.size)
+        for k in range(len(ready.intervals.labels))
+    ]
+    return np.stack([_flow_coefficients(one, study, spline) for one in longest])
 
 
 def _log_noise(estimates: Sequence[float], least: float) -> float:

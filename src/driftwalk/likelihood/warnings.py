@@ -65,7 +65,6 @@ def warnings_of(
         *_on_the_data(facts, visited, intervals),
         *_on_the_search(facts),
         *_on_the_model(facts),
-        *_on_the_turning(facts),
         *_on_glued_blocks(facts),
     ]
 
@@ -76,30 +75,17 @@ def meaningless_of(
     block: Block,
     wall_share: float = LIMIT.most_wall_share,
     lever: float = LAW.notable_lever,
-) -> list[str]:
-    """Return the warnings that a number of the fit may mean nothing.
+) -> Iterator[str]:
+    """Yield the warnings that a number of the fit may mean nothing.
 
-    `wall_share` and `lever`, in sides of the block, are the largest ones without a warning; forces
-    on each of glued blocks make a lever of their own.
+    `wall_share` and `lever`, in sides of the block, are the largest ones without a warning.
     """
-    return [
-        *_on_the_wall(facts, wall_share),
-        *_on_the_likelihood(facts),
-        *_on_two_uses_of_the_angle(facts),
-        *_on_the_lever(facts, lever * block.side_m + block.body().force_lever_m()),
-    ]
-
-
-def _on_the_wall(facts: Mapping[str, Any], most: float) -> Iterator[str]:
-    if facts["wall_share"] > most:
+    if facts["wall_share"] > wall_share:
         yield (
             f"{in_percent(facts['wall_share'])} of the intervals are at the wall and were "
             "left out: C_d comes from the others alone; record where the block stays away from "
             "the wall"
         )
-
-
-def _on_the_likelihood(facts: Mapping[str, Any]) -> Iterator[str]:
     left = facts.get("search_left", 0.0)
     if left:
         yield (
@@ -114,9 +100,6 @@ def _on_the_likelihood(facts: Mapping[str, Any]) -> Iterator[str]:
             "likelihood and is likely too large; the motion says little about C_d or "
             "does not follow the model"
         )
-
-
-def _on_two_uses_of_the_angle(facts: Mapping[str, Any]) -> Iterator[str]:
     if facts.get("angle_disagreement_std", 0.0) > WARNING.disagreement_stds:
         yield (
             f"with the angle as an input C_d is {facts['drag_coefficient_angle_given']:.3g}, "
@@ -124,9 +107,8 @@ def _on_two_uses_of_the_angle(facts: Mapping[str, Any]) -> Iterator[str]:
             "of the block and its motion do not follow one drag law, and the intervals are too "
             "narrow"
         )
-
-
-def _on_the_lever(facts: Mapping[str, Any], most_m: float) -> Iterator[str]:
+    # Forces on each of glued blocks make a lever of their own.
+    most_m = lever * block.side_m + block.body().force_lever_m()
     if facts.get("force_lever_m_interval", (0.0, 0.0))[0] > most_m:
         yield (
             f"the block turns as if the force acted {1e3 * facts['force_lever_m']:.2g} mm from its "
@@ -241,9 +223,6 @@ def _on_the_model(facts: Mapping[str, Any]) -> Iterator[str]:
             "sample to the next): the motion contains something that the model "
             "lacks, and the intervals are too narrow"
         )
-
-
-def _on_the_turning(facts: Mapping[str, Any]) -> Iterator[str]:
     if is_against_water(facts):
         yield against_water(facts)
     if math.isnan(facts.get("angle_disagreement_std", 0.0)):

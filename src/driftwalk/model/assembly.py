@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.binding import Binding, Kind, face_types, faces_text
-from driftwalk.model.section import Placeholder, Quantity, Section, Seed
+from driftwalk.model.section import Placeholder, Quantity, Section, Seed, not_set
 
 MOST_BLOCKS: Final = 2000
 """The most that the native core takes."""
 
+BlockCount = Annotated[int, Quantity("1", ge=1, le=MOST_BLOCKS, whole=True)]
+BondRate = Annotated[float, Quantity("1/s", ge=0, le=1e6)]
 Latching = Literal["collision", "connector", "none"]
-HiddenFaceDrag = Annotated[
-    float | Literal["none", "full"], Quantity("1", ge=0, le=1, words=("none", "full"))
-]
+HiddenFaceDrag = Annotated[float | Literal["none", "full"], Quantity("1", ge=0, le=1)]
 """A share of a free face's drag."""
 Chirality = Literal["merged", "distinct"]
 
@@ -32,7 +32,7 @@ class Assembly(Section):
 
     section_name: ClassVar[str] = "assembly"
 
-    blocks: Annotated[int, Quantity("1", ge=1, le=MOST_BLOCKS, whole=True)] = 4
+    blocks: BlockCount = 4
     """Blocks in the tank."""
     runs: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = 1000
     """Simulated runs, each with its own start and random numbers."""
@@ -60,9 +60,8 @@ class Assembly(Section):
     Types of the faces +x, +y, -x, -y of every block: N and S are fixed magnets, of which unlike
     ones latch, "none" (or -) latches with none. "any": every face latches with every other.
     """
-    binding: Binding | None = Field(
-        default=None,
-        examples=['{ kinds = [{ name = "A", count = 4, faces = ["N", "S", "N", "S"] }] }'],
+    binding: Binding | None = not_set(
+        '{ kinds = [{ name = "A", count = 4, faces = ["N", "S", "N", "S"] }] }'
     )
     """Kinds of blocks, types of their faces, which of them latch, and what blocks become then: the
     table of `driftwalk assemble --binding`, in place of `faces`."""
@@ -89,7 +88,7 @@ class Assembly(Section):
     """
     block_friction: Annotated[float, Quantity("1", ge=0, le=100)] = 0.0
     """Coulomb friction between two blocks; 0 for wet faces."""
-    bond_rate_per_s: Annotated[float, Quantity("1/s", ge=0, le=1e6)] = 0.0
+    bond_rate_per_s: BondRate = 0.0
     """Rate at which each bond breaks, 0: never; as an option also 0.01/s,2mN, with the tension that
     multiplies it by e.
 

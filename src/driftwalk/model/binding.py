@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, ClassVar, Final, Literal, Self
 
-from pydantic import model_validator
+from pydantic import AfterValidator, model_validator
 
 from driftwalk.core.errors import ConfigurationError, FormatError, did_you_mean
 from driftwalk.core.text_files import MOST_TOML_BYTES, parse_toml, read_bounded
@@ -202,6 +202,9 @@ def faces_text(text: str) -> str:
     """Return the types of a block's faces as a study has them: "any" or "N,S,N,S"."""
     types = face_types(text)
     return "any" if types is None else ",".join(types)
+
+
+FacesText = Annotated[str, AfterValidator(faces_text)]
 
 
 def read_binding(path: str | Path) -> Binding:

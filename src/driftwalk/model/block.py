@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypedDict
 
-from pydantic import Field, ModelWrapValidatorHandler, model_validator
+from pydantic import ModelWrapValidatorHandler, model_validator
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model.section import OrNumber, Placeholder, Quantity, Section
+from driftwalk.model.section import OrNumber, Placeholder, Quantity, Section, not_set
 
 if TYPE_CHECKING:
     from driftwalk.model.rigid_bodies import RigidBody
@@ -49,9 +49,7 @@ class Block(Section):
 
     Side a of the square, or of each of the glued blocks; diameter of a disc; length of a rectangle.
     """
-    width_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
-        default=None, examples=[0.02]
-    )
+    width_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = not_set(0.02)
     """Width of a rectangle, its second side."""
     mass_kg: Annotated[float, Quantity("kg", gt=0, le=1e4)] = 0.0116
     """Mass of the block.
@@ -65,9 +63,7 @@ class Block(Section):
     which the body floats, d = m / (density area). The drag depends only on the product of
     drag_coefficient and depth, so always state the two together.
     """
-    depth_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
-        default=None, examples=[0.0129]
-    )
+    depth_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = not_set(0.0129)
     """Wetted depth d as a length, instead of `depth`."""
     strips_per_face: Annotated[int, Quantity("1", ge=1, le=64, whole=True)] = 8
     """Vertical strips into which each side face is cut for the drag."""
@@ -189,6 +185,7 @@ def _sizes(text: str) -> dict[str, str]:
 
 DragCoefficient = Annotated[float, Quantity("1", ge=0, le=100)]
 """Bounds are a hundred times what bodies have: they catch a wrong unit."""
+StirringLength = Annotated[float, Quantity("m", ge=0, le=1e3)]
 ForceStd = Annotated[float, Quantity("N", ge=0, le=10)]
 """Bounds are ten thousand times what the paper found: they catch a wrong unit."""
 
@@ -226,7 +223,7 @@ class Forces(Section):
     exp(-force_interval / T) of the one before it, and 1 - k is new, with standard deviation
     sigma_F: the noise intensity is still sigma_F^2 * force_interval.
     """
-    stirring_length_m: Annotated[float, Quantity("m", ge=0, le=1e3)] = 0.0
+    stirring_length_m: StirringLength = 0.0
     """Distance over which blocks share the stochastic force.
 
     Length L of the stochastic force in space: two blocks at a distance r feel forces with the
@@ -235,9 +232,7 @@ class Forces(Section):
     """
     stirring: Literal["free", "incompressible"] = "free"
     """Force field of the stirring: "free", or "incompressible" (without divergence)."""
-    force_lever_m: Annotated[float | None, Quantity("m", ge=0, le=10)] = Field(
-        default=None, examples=[0.01]
-    )
+    force_lever_m: Annotated[float | None, Quantity("m", ge=0, le=10)] = not_set(0.01)
     """Lever with which the stochastic force turns the body.
 
     Lever of the stochastic force, rms: every interval the body feels a torque too, with the
@@ -288,9 +283,7 @@ class Flow(Section):
 
     cells: Annotated[int, Quantity("1", ge=2, le=2000, whole=True)] = 50
     """Cells across the longer side of the tank."""
-    cell_size_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
-        default=None, examples=[0.006]
-    )
+    cell_size_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = not_set(0.006)
     """Side of a cell, instead of `cells`."""
     smoothing_window_s: Annotated[float, Quantity("s", gt=0, le=1e3)] = 0.7
     """Window of the local quadratic fit that gives velocity and acceleration."""

@@ -6,10 +6,10 @@ import itertools
 import re
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model.section import Placeholder, Quantity, Section
+from driftwalk.model.section import Placeholder, Quantity, Section, not_set
 
 Time = Annotated[float, Quantity("s", ge=-1e12, le=1e12)]
 """Bounds as those of the time stamps that are read: powers of longer times are beyond float64."""
@@ -26,9 +26,7 @@ class Fit(Section):
 
     section_name: ClassVar[str] = "fit"
 
-    spline_spacing_m: Annotated[
-        float | Literal["auto"], Quantity("m", gt=0, le=10, words=("auto",))
-    ] = "auto"
+    spline_spacing_m: Annotated[float | Literal["auto"], Quantity("m", gt=0, le=10)] = "auto"
     """Distance between the knots of the flow. "auto" is two thirds of the side of the block (2 cm
     for 3 cm), or a 24th of the tank if that is more."""
     angle: Literal["auto", "state", "given", "none"] = "auto"
@@ -42,15 +40,15 @@ class Fit(Section):
     """Largest number of steps of the search, which ends when the steps become small."""
     confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.9
     """Confidence of the intervals."""
-    switching_times_s: tuple[Time, ...] | None = Field(default=None, examples=["[600.0, 1200.0]"])
+    switching_times_s: tuple[Time, ...] | None = not_set("[600.0, 1200.0]")
     """Times at which the pumps were switched, on each recording's clock; each interval has its own
     flow.
 
     Times, on the clock of each recording, at which the pumps were switched. Each interval between
     them has its own flow, and all share drag and noises. Without them the flow is steady.
     """
-    flow_labels: Annotated[tuple[str, ...] | None, Placeholder("A,B,...")] = Field(
-        default=None, examples=['["A", "B", "A"]']
+    flow_labels: Annotated[tuple[str, ...] | None, Placeholder("A,B,...")] = not_set(
+        '["A", "B", "A"]'
     )
     """Names of the flows between switching times; repeat a name for a flow that comes back.
 
@@ -70,9 +68,7 @@ class Fit(Section):
     Whether the water's own acceleration pushes the block and its added mass, as it does a floating
     body. "auto" takes what the recording supports.
     """
-    added_mass_share: Annotated[
-        float | Literal["auto"], Quantity("1", ge=0, le=5, words=("auto",))
-    ] = "auto"
+    added_mass_share: Annotated[float | Literal["auto"], Quantity("1", ge=0, le=5)] = "auto"
     """Added mass as a share of the block's mass.
 
     Added mass as a share of the block's mass; the inertia grows by the same share. A recording
@@ -85,9 +81,7 @@ class Fit(Section):
     """Standard deviation of the mass of the block."""
     side_std_m: Annotated[float, Quantity("m", ge=0, le=10)] = 0.0
     """Standard deviation of the side of the block."""
-    force_memory_s: Annotated[
-        float | Literal["auto", "white"], Quantity("s", gt=0, le=10, words=("auto", "white"))
-    ] = "auto"
+    force_memory_s: Annotated[float | Literal["auto", "white"], Quantity("s", gt=0, le=10)] = "auto"
     """Correlation time of the stochastic force.
 
     Correlation time of the stochastic force, or "white" for none. "auto" estimates one if the
@@ -118,9 +112,7 @@ class Fit(Section):
     Whether all free bodies of a recording are fitted together. The correlation of the forces on
     them then gives the length over which the stirring is shared.
     """
-    flow_error_m_s: Annotated[
-        float | Literal["auto"], Quantity("m/s", gt=0, le=100, words=("auto",))
-    ] = "auto"
+    flow_error_m_s: Annotated[float | Literal["auto"], Quantity("m/s", gt=0, le=100)] = "auto"
     """Standard deviation of each component of the vectors of a measured flow.
 
     Standard deviation of each component of the vectors of a measured flow. "auto" takes the errors
@@ -132,9 +124,7 @@ class Fit(Section):
     Relative standard deviation of the common scale of a measured flow: of the ruler and of the
     interval between its frames. The fit estimates the scale; 0 takes it as exact.
     """
-    drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
-        default=None, examples=[0.05]
-    )
+    drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = not_set(0.05)
     """Wanted relative standard error of C_d.
 
     Wanted relative standard error of C_d: the fit says whether it is reached, and if not, how long

@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 from typing import Annotated, ClassVar, Final, Literal, NamedTuple, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.units import parse_quantity
-from driftwalk.model.section import Placeholder, Quantity, Section
+from driftwalk.model.section import Placeholder, Quantity, Section, not_set
 
 Poles = Literal["turning", "fixed"]
-MagnetText = Annotated[str, Placeholder("SIZE,REMANENCE")]
 _MAGNET: Final = re.compile(
     r"\s*([\d.]+)\s*x\s*([\d.]+)\s*x\s*([\d.]+)\s*([a-zµμ]*)\s*,\s*([\d.]+)\s*(m?T)\s*"
 )
@@ -63,6 +62,14 @@ def parse_magnet(text: str) -> Magnet | None:
     return Magnet(width, height, thickness, field)
 
 
+def _magnet_text(text: str) -> str:
+    parse_magnet(text)
+    return text
+
+
+MagnetText = Annotated[str, Placeholder("SIZE,REMANENCE"), AfterValidator(_magnet_text)]
+
+
 class Interaction(Section):
     """Forces between blocks before they touch: none, unless a key says so.
 
@@ -88,9 +95,7 @@ class Interaction(Section):
     "turning": a magnet turns in its seat, so any face attracts any face, along the line between
     the two magnets; "fixed": its axis is the face's normal.
     """
-    attraction: Annotated[str | None, Placeholder("FILE")] = Field(
-        default=None, examples=["attraction.csv"]
-    )
+    attraction: Annotated[str | None, Placeholder("FILE")] = not_set("attraction.csv")
     """Table of the force between two faces.
 
     CSV table of the force between two faces, instead of magnets: columns gap_m, force_N, and
@@ -108,20 +113,12 @@ class Interaction(Section):
     Resistance k of the water between two blocks, 0 for none: a force k times their closing speed
     over the gap between them.
     """
-    cutoff_m: Annotated[float | Literal["auto"], Quantity("m", gt=0, le=10, words=("auto",))] = (
-        "auto"
-    )
+    cutoff_m: Annotated[float | Literal["auto"], Quantity("m", gt=0, le=10)] = "auto"
     """Gap beyond which faces and menisci feel nothing.
 
     Gap between two faces beyond which magnets, a table and menisci have no effect; "auto": where
     magnets attract with 0.01 mN, at the end of the table, and at 12 capillary lengths of menisci.
     """
-
-    @field_validator("magnets")
-    @classmethod
-    def _is_magnet(cls, text: str) -> str:
-        parse_magnet(text)
-        return text
 
     @model_validator(mode="after")
     def _one_attraction(self) -> Self:

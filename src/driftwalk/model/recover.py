@@ -5,11 +5,20 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar, Final, Literal
 
-from pydantic import Field, field_validator
+from pydantic import field_validator
 
 from driftwalk.core.errors import ConfigurationError, did_you_mean
 from driftwalk.model.fit import Fit
-from driftwalk.model.section import Placeholder, Quantity, Section, Seed, distinct, quoted, words_of
+from driftwalk.model.section import (
+    Placeholder,
+    Quantity,
+    Section,
+    Seed,
+    distinct,
+    not_set,
+    quoted,
+    words_of,
+)
 
 LARGEST_STEP_S: Final = 0.0025
 """Largest time step of a simulation that is taken for the truth: its error is then far below what a
@@ -30,7 +39,7 @@ class Recover(Section):
 
     section_name: ClassVar[str] = "recover"
 
-    flow: Annotated[str | None, Placeholder("FILE")] = Field(default=None, examples=["fit/flow.nc"])
+    flow: Annotated[str | None, Placeholder("FILE")] = not_set("fit/flow.nc")
     """File of the true flow field (default: the study file's).
 
     File of the true flow field, relative to the study file; "random" draws a different flow for
@@ -39,9 +48,7 @@ class Recover(Section):
     flow_family: Literal["swirl", "eddies"] = "swirl"
     """Family of random flows: "swirl" with jets and a sink, in which a block goes round on regular
     orbits, or "eddies"."""
-    flow_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=100)] = Field(
-        default=None, examples=[0.05]
-    )
+    flow_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=100)] = not_set(0.05)
     """Root mean square speed of random flows; if not set, the speed as drawn."""
     recordings: Annotated[int, Quantity("1", ge=2, le=100_000, whole=True)] = 20
     """Number of recordings to simulate and fit, for each length."""
@@ -55,11 +62,9 @@ class Recover(Section):
     """Share of the samples that the camera misses, at random."""
     settling_s: Annotated[float, Quantity("s", ge=0, le=1e6)] = 20.0
     """Time from the start, at rest, to the first sample of the recording."""
-    angle: tuple[str, ...] | None = Field(default=None, examples=['["given", "none"]'])
+    angle: tuple[str, ...] | None = not_set('["given", "none"]')
     """Uses of the orientation to compare, as in [fit] angle; if not set, the one in [fit]."""
-    drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
-        default=None, examples=[0.05]
-    )
+    drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = not_set(0.05)
     """Wanted relative error of C_d (rms).
 
     Wanted relative error of C_d, root mean square: the study says how long to record for it.

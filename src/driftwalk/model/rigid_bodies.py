@@ -28,6 +28,10 @@ class Measures(NamedTuple):
     """Share of the drag of a free face that a face between two cells feels, 0 to 1."""
 
 
+QUADRANTS: Final = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+"""Signs of the corners of a rectangle about its middle, counter-clockwise."""
+
+
 @dataclass(frozen=True, eq=False)
 class RigidBody:
     """An outline about its centre of mass, seen from above, in the body's own frame.
@@ -145,12 +149,10 @@ def _rectangle(length: float, width: float, strips: int) -> RigidBody:
         face((nx * length / 2, ny * width / 2), (nx, ny), width if nx else length, strips)
         for nx, ny in normals
     ]
-    signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    half = np.array([length, width]) / 2
     return RigidBody(
         area_m2=length * width,
         panels=np.concatenate(faces),
-        corners=signs * half,
+        corners=QUADRANTS * (np.array([length, width]) / 2),
         moment_points=gauss_points(length, width),
         symmetry=4 if length == width else 2,
     )
@@ -197,19 +199,6 @@ MOST_CELLS = 64
 """A body may have this many: in every step 32 panels of each are read."""
 
 
-def polyomino(shape: str) -> Callable[[Measures], RigidBody] | None:
-    """Return the maker of a polyomino, by its name or rows; None when it is no polyomino.
-
-    Examples
-    --------
-    >>> dimer = polyomino("xx")(Measures(side_m=0.03, hidden_share=0.5))
-    >>> round(float(dimer.panels[:, 4].sum()), 6)  # six free faces, two that half count
-    0.21
-    """
-    cells = cells_of_shape(shape)
-    return (lambda measures: _glued(cells, measures)) if len(cells) > 1 else None
-
-
 def _glued(cells: Cells, measures: Measures) -> RigidBody:
     side = measures.side_m
     if len(cells) > MOST_CELLS:
@@ -247,8 +236,8 @@ def _hull(centres: Floats, side: float) -> Floats:
     """Return the corners of the convex hull: no others touch a wall of a convex tank."""
     from scipy.spatial import ConvexHull
 
-    offsets = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * side / 2
-    corners = np.unique(np.round((centres[:, None] + offsets).reshape(-1, 2), 12), axis=0)
+    reached = centres[:, None] + QUADRANTS * side / 2
+    corners = np.unique(np.round(reached.reshape(-1, 2), 12), axis=0)
     return np.asarray(corners[ConvexHull(corners).vertices])
 
 
@@ -293,15 +282,16 @@ def rigid_body(shape: str, measures: Measures) -> RigidBody:
     --------
     >>> rigid_body("disc", Measures(side_m=0.04)).symmetry
     0
-    >>> rigid_body("xx", Measures(side_m=0.03)).corners.shape
-    (4, 2)
+    >>> dimer = rigid_body("xx", Measures(side_m=0.03, hidden_share=0.5))
+    >>> round(float(dimer.panels[:, 4].sum()), 6)  # six free faces, two that half count
+    0.21
     """
-    make = BODIES.get(shape, polyomino(shape))
-    if make is None:
+    cells = cells_of_shape(shape)
+    if shape not in BODIES and len(cells) < 2:
         raise ConfigurationError(
             f"no body shape {shape!r}: {', '.join(BODIES)}, or the rows of a polyomino such as "
             "'xx' or 'x./xx'"
         )
     if measures.width_m is not None and shape != "rectangle":
         raise ConfigurationError(f"width_m belongs to a rectangle, the shape is {shape!r}")
-    return make(measures)
+    return BODIES[shape](measures) if shape in BODIES else _glued(cells, measures)

@@ -13,13 +13,13 @@ import inspect
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Final, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
 
 from driftwalk.core.errors import ConfigurationError, did_you_mean
@@ -35,7 +35,9 @@ force of a laboratory, and its third and fourth powers are still numbers. The sq
 
 @dataclass(frozen=True)
 class Quantity:
-    """Declares a number of a study: its unit, its range, and the words it may be instead.
+    """Declares a number of a study: its unit and its range.
+
+    Words of the field's type, `Literal["auto"]`, may stand in place of a number.
 
     Parameters
     ----------
@@ -43,8 +45,6 @@ class Quantity:
         SI unit of the stored value, ``"1"`` for none. Text such as ``"0.55mN"`` is read.
     ge, gt, le, lt : float, optional
         Bounds: at least, more than, at most, less than.
-    words : tuple of str
-        Words that may replace a number (``"auto"``, ``"estimate"``).
     whole : bool
         Whether only whole numbers are accepted.
     """
@@ -54,16 +54,16 @@ class Quantity:
     gt: float | None = None
     le: float | None = None
     lt: float | None = None
-    words: tuple[str, ...] = ()
     whole: bool = False
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Put `check` in front of the type's own validation."""
-        return core_schema.no_info_before_validator_function(self.check, handler(source))
+        check = partial(self.check, words=_words_in(source))
+        return core_schema.no_info_before_validator_function(check, handler(source))
 
-    def check(self, value: Any) -> Any:
+    def check(self, value: Any, words: tuple[str, ...]) -> Any:
         """Return the value in the declared unit, or a word as it is.
 
         Raises
@@ -71,21 +71,22 @@ class Quantity:
         ConfigurationError
             When it is neither, or out of range.
         """
-        if value is None or (isinstance(value, str) and value in self.words):
+        if value is None or (isinstance(value, str) and value in words):
             return value
-        if self.words and isinstance(value, str) and value[:1].isalpha():
+        unit = f" {self.unit}" if self.unit != "1" else ""
+        if words and isinstance(value, str) and value[:1].isalpha():
             raise ConfigurationError(
-                f"expected a number{self._in_unit()} or {quoted(self.words)}, got '{value}'"
-                f"{did_you_mean(value, self.words)}"
+                f"expected a number{unit and f' in{unit}'} or {quoted(words)}, got '{value}'"
+                f"{did_you_mean(value, words)}"
             )
         if self.whole:
-            number: float = self._whole(value)
+            if isinstance(value, bool) or not isinstance(value, int):
+                raise ConfigurationError(f"expected a whole number, got {value!r}")
+            number: float = value
         else:
             number = parse_quantity(value, self.unit)
             if self.gt == 0 and 0.0 < number < SMALLEST:
-                raise ConfigurationError(
-                    f"must be at least {SMALLEST:g}{self._its_unit()}, got {value}"
-                )
+                raise ConfigurationError(f"must be at least {SMALLEST:g}{unit}, got {value}")
         for bound, holds, text in (
             (self.ge, number >= (self.ge or 0.0), "at least"),
             (self.gt, number > (self.gt or 0.0), "more than"),
@@ -93,7 +94,7 @@ class Quantity:
             (self.lt, number < (self.lt or 0.0), "less than"),
         ):
             if bound is not None and not holds:
-                raise ConfigurationError(f"must be {text} {bound:g}{self._its_unit()}, got {value}")
+                raise ConfigurationError(f"must be {text} {bound:g}{unit}, got {value}")
         return number
 
     def range_text(self) -> str:
@@ -106,20 +107,14 @@ class Quantity:
         ]
         return ", ".join(parts)
 
-    def _its_unit(self) -> str:
-        return f" {self.unit}" if self.unit != "1" else ""
-
-    def _in_unit(self) -> str:
-        return f" in {self.unit}" if self.unit != "1" else ""
-
-    def _whole(self, value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise ConfigurationError(f"expected a whole number, got {value!r}")
-        return value
-
 
 Seed = Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)]
 """The largest is that of a 64-bit integer of a NetCDF file."""
+
+
+def not_set(example: Any) -> Any:
+    """Return a field that is not set by default, with an example for the template."""
+    return Field(default=None, examples=[example])
 
 
 @dataclass(frozen=True)
@@ -231,6 +226,14 @@ def _texts_of(module: str) -> dict[tuple[str, str], str]:
     }
 
 
+_UNIT_OF_KEY: Final = re.compile(r"_(m_s|per_s|Hz|[msN])$")
+
+
+def without_unit(key: str) -> str:
+    """Return a key without the unit that its name ends with."""
+    return _UNIT_OF_KEY.sub("", key)
+
+
 def distinct(values: tuple[Item, ...]) -> tuple[Item, ...]:
     """Return the values of a list; refuse an empty one, and one that names a value twice."""
     if not values:
@@ -246,14 +249,9 @@ def quoted(words: Iterable[str]) -> str:
 
 
 def quantity_of(section: type[Section], key: str) -> Quantity | None:
-    """Return the declared quantity of a field, None for a field that is not a number."""
-    metadata = section.model_fields[key].metadata
-    return next((item for item in metadata if isinstance(item, Quantity)), None)
-
-
-def item_quantity_of(section: type[Section], key: str) -> Quantity | None:
-    """Return the declared quantity of the items of a list, None for any other field."""
-    parts = _parts(section.model_fields[key].annotation)
+    """Return the declared quantity of a field, or of the items of a list; None for other fields."""
+    field = section.model_fields[key]
+    parts = [*field.metadata, *_parts(field.annotation)]
     return next((part for part in parts if isinstance(part, Quantity)), None)
 
 
@@ -264,8 +262,11 @@ def is_list(section: type[Section], key: str) -> bool:
 
 def words_of(section: type[Section], key: str) -> tuple[str, ...]:
     """Return the words that a field, or an item of a list, accepts; empty for any or none."""
-    parts = _parts(section.model_fields[key].annotation)
-    return tuple(dict.fromkeys(part for part in parts if isinstance(part, str)))
+    return _words_in(section.model_fields[key].annotation)
+
+
+def _words_in(annotation: Any) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(part for part in _parts(annotation) if isinstance(part, str)))
 
 
 def _parts(annotation: Any) -> Iterator[Any]:
@@ -295,7 +296,8 @@ def _sentence(section: type[Section], problem: ErrorDetails) -> str:
         return f"[{name}] {cause}" if name else str(cause or problem["msg"])
     key = str(location[0])
     if kind == "extra_forbidden":
-        return _unknown_key(section, key)
+        unknown = f"[{name}] unknown key" if name else "unknown section or key"
+        return f"{unknown} '{key}'{did_you_mean(key, section.model_fields)}"
     if not name and kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"[{key}] must be a section of keys, got {value!r}"
     where = f"[{name}] {key}" if name else key
@@ -315,26 +317,15 @@ def _sentence(section: type[Section], problem: ErrorDetails) -> str:
     return f"{where} {message}, got {value!r}"
 
 
-def _unknown_key(section: type[Section], key: str) -> str:
-    hint = did_you_mean(key, section.model_fields)
-    if section.section_name:
-        return f"[{section.section_name}] unknown key '{key}'{hint}"
-    return f"unknown section or key '{key}'{hint}"
-
-
-def write_toml(sections: Mapping[str, Section]) -> str:
-    """Return named sections as TOML without comments and without the keys that are not set."""
-    parts = []
-    for name, section in sections.items():
-        lines = [f"{key} = {toml_text(value)}" for key, value in _set_values(section)]
-        parts.append("\n".join([f"[{name}]", *lines]))
-    return "\n\n".join(parts) + "\n"
+def toml_lines(section: Section) -> list[str]:
+    """Return the keys of a section that are set, as lines of TOML."""
+    return [f"{key} = {toml_text(value)}" for key, value in section if value is not None]
 
 
 def toml_text(value: Any) -> str:
     """Return a value as TOML; its strings are JSON's, but for the delete character."""
     if isinstance(value, Section):
-        inner = ", ".join(f"{key} = {toml_text(item)}" for key, item in _set_values(value))
+        inner = ", ".join(toml_lines(value))
         return f"{{ {inner} }}" if inner else "{}"
     if isinstance(value, (tuple, list)):
         return "[" + ", ".join(toml_text(item) for item in value) + "]"
@@ -343,10 +334,3 @@ def toml_text(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(value)
-
-
-def _set_values(section: Section) -> Iterator[tuple[str, Any]]:
-    for key in type(section).model_fields:
-        value = getattr(section, key)
-        if value is not None:
-            yield key, value

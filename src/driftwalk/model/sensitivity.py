@@ -5,34 +5,16 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar, Final, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.grid import MOST_SETTINGS
-from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
-from driftwalk.model.binding import faces_text
-from driftwalk.model.block import DragCoefficient, ForceStd
+from driftwalk.model.assembly import BlockCount, BondRate, HiddenFaceDrag, Latching
+from driftwalk.model.binding import FacesText
+from driftwalk.model.block import DragCoefficient, ForceStd, StirringLength
 from driftwalk.model.calibration import ForceGrid
-from driftwalk.model.interaction import MagnetText, parse_magnet
-from driftwalk.model.section import Quantity, Seed, distinct
-
-AXES: Final[dict[str, str]] = {
-    "tank_diameter": "tank_diameter_m",
-    "blocks": "blocks",
-    "flow": "flow",
-    "flow_scale": "flow_scale",
-    "glued": "glued",
-    "latching": "latching",
-    "faces": "faces",
-    "hidden_face_drag": "hidden_face_drag",
-    "stirring_length": "stirring_length_m",
-    "bond_rate": "bond_rate_per_s",
-    "magnets": "magnets",
-    "drag_coefficient": "drag_coefficient",
-    "force_std": "force_std_N",
-}
-"""From the name of an axis to the key of its list; the order is that of the dimensions."""
-LISTS: Final = tuple(AXES.values())
+from driftwalk.model.interaction import MagnetText
+from driftwalk.model.section import Quantity, Seed, distinct, is_list, not_set, without_unit
 
 
 class Sensitivity(ForceGrid):
@@ -61,67 +43,41 @@ class Sensitivity(ForceGrid):
     """Number of realisations of the reference, which is their mean."""
     seed: Seed = 1
     """Seed of the random numbers."""
-    tank_diameter_m: tuple[Annotated[float, Quantity("m", gt=0, le=1e3)], ...] | None = Field(
-        default=None, examples=["[0.25, 0.3]"]
+    tank_diameter_m: tuple[Annotated[float, Quantity("m", gt=0, le=1e3)], ...] | None = not_set(
+        "[0.25, 0.3]"
     )
     """Diameters of circular tanks to compare, an axis of the map."""
-    blocks: tuple[Annotated[int, Quantity("1", ge=1, le=MOST_BLOCKS, whole=True)], ...] | None = (
-        Field(default=None, examples=["[3, 4, 5]"])
-    )
+    blocks: tuple[BlockCount, ...] | None = not_set("[3, 4, 5]")
     """Numbers of blocks to compare, an axis of the map."""
-    flow: tuple[str, ...] | None = Field(default=None, examples=['["flow_a.nc", "flow_b.nc"]'])
+    flow: tuple[str, ...] | None = not_set('["flow_a.nc", "flow_b.nc"]')
     """Files of flow fields to compare, an axis of the map."""
-    flow_scale: tuple[Annotated[float, Quantity("1", ge=0, le=100)], ...] | None = Field(
-        default=None, examples=["[0.5, 1.0, 1.5]"]
+    flow_scale: tuple[Annotated[float, Quantity("1", ge=0, le=100)], ...] | None = not_set(
+        "[0.5, 1.0, 1.5]"
     )
     """Factors on the flow velocity to compare, an axis of the map."""
-    glued: tuple[str, ...] | None = Field(default=None, examples=['["x", "xx"]'])
+    glued: tuple[str, ...] | None = not_set('["x", "xx"]')
     """Bodies that blocks start glued to, to compare, an axis of the map."""
-    latching: tuple[Latching, ...] | None = Field(
-        default=None, examples=['["collision", "connector"]']
-    )
+    latching: tuple[Latching, ...] | None = not_set('["collision", "connector"]')
     """Latching rules to compare, an axis of the map."""
-    faces: tuple[str, ...] | None = Field(default=None, examples=['["any", "NSNS"]'])
+    faces: tuple[FacesText, ...] | None = not_set('["any", "NSNS"]')
     """Types of the blocks' faces to compare, an axis of the map."""
-    hidden_face_drag: tuple[HiddenFaceDrag, ...] | None = Field(
-        default=None, examples=['["none", "full"]']
-    )
+    hidden_face_drag: tuple[HiddenFaceDrag, ...] | None = not_set('["none", "full"]')
     """Rules for the drag on joined faces to compare, an axis of the map."""
-    stirring_length_m: tuple[Annotated[float, Quantity("m", ge=0, le=1e3)], ...] | None = Field(
-        default=None, examples=["[0.0, 0.03, 0.1]"]
-    )
+    stirring_length_m: tuple[StirringLength, ...] | None = not_set("[0.0, 0.03, 0.1]")
     """Lengths over which blocks share the stochastic force to compare, an axis of the map."""
-    bond_rate_per_s: tuple[Annotated[float, Quantity("1/s", ge=0, le=1e6)], ...] | None = Field(
-        default=None, examples=["[0.0, 0.001, 0.01]"]
-    )
+    bond_rate_per_s: tuple[BondRate, ...] | None = not_set("[0.0, 0.001, 0.01]")
     """Rates at which bonds break to compare, an axis of the map."""
-    magnets: tuple[MagnetText, ...] | None = Field(
-        default=None, examples=['["none", "3x3x1mm,1.2T"]']
-    )
+    magnets: tuple[MagnetText, ...] | None = not_set('["none", "3x3x1mm,1.2T"]')
     """Magnets to compare, an axis of the map."""
-    drag_coefficient: tuple[DragCoefficient, ...] | None = Field(
-        default=None, examples=["[0.2, 0.45, 1.0]"]
-    )
+    drag_coefficient: tuple[DragCoefficient, ...] | None = not_set("[0.2, 0.45, 1.0]")
     """Drag coefficients to compare, an axis of the map, instead of the range."""
-    force_std_N: tuple[ForceStd, ...] | None = Field(default=None, examples=['["0.2mN", "0.55mN"]'])
+    force_std_N: tuple[ForceStd, ...] | None = not_set('["0.2mN", "0.55mN"]')
     """Values of force_std to compare, an axis of the map, instead of the range."""
 
-    @field_validator("faces")
+    @field_validator("*")
     @classmethod
-    def _face_types(cls, values: tuple[str, ...] | None) -> tuple[str, ...] | None:
-        return None if values is None else tuple(map(faces_text, values))
-
-    @field_validator(*LISTS)
-    @classmethod
-    def _distinct(cls, values: tuple[Any, ...] | None) -> tuple[Any, ...] | None:
-        return None if values is None else distinct(values)
-
-    @field_validator("magnets")
-    @classmethod
-    def _are_magnets(cls, values: tuple[str, ...] | None) -> tuple[str, ...] | None:
-        for text in values or ():
-            parse_magnet(text)
-        return values
+    def _distinct(cls, value: Any) -> Any:
+        return distinct(value) if isinstance(value, tuple) else value
 
     @model_validator(mode="after")
     def _grid_has_settings(self) -> Self:
@@ -151,3 +107,9 @@ class Sensitivity(ForceGrid):
         """Values of each axis of the map: the lists, else the ranges of C_d and σ_F."""
         ranges = {"drag_coefficient": self.drag_coefficients, "force_std": self.force_stds_N}
         return self.lists or ranges
+
+
+AXES: Final[dict[str, str]] = {
+    without_unit(key): key for key in Sensitivity.model_fields if is_list(Sensitivity, key)
+}
+"""From the name of an axis to the key of its list; the order is that of the dimensions."""

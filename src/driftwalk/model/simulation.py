@@ -29,9 +29,7 @@ class Simulation(Section):
 
     section_name: ClassVar[str] = "simulation"
 
-    time_step_s: Annotated[
-        float | Literal["auto"], Quantity("s", gt=0, le=0.1, words=("auto",))
-    ] = "auto"
+    time_step_s: Annotated[float | Literal["auto"], Quantity("s", gt=0, le=0.1)] = "auto"
     """Time step; divides the force interval.
 
     Time step of the integrator; "auto" is the largest whole divisor of force_interval_s up to 10

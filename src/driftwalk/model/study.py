@@ -30,13 +30,12 @@ from driftwalk.model.section import (
     Section,
     description_of,
     is_list,
-    item_quantity_of,
     meaning_of,
     quantity_of,
     quoted,
+    toml_lines,
     toml_text,
     words_of,
-    write_toml,
 )
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
@@ -180,7 +179,8 @@ class Study(Section):
 
     def to_toml(self) -> str:
         """Return the study as the text of a study file; `load_study` reads the same study back."""
-        return write_toml({name: getattr(self, name) for name in type(self).model_fields})
+        parts = ["\n".join([f"[{name}]", *toml_lines(section)]) for name, section in self]
+        return "\n\n".join(parts) + "\n"
 
 
 def block_corners(pose: Pose, block: Block) -> list[tuple[float, float]]:
@@ -285,8 +285,13 @@ def apply_overrides(study: Study, overrides: Mapping[str, Any]) -> Study:
     values = study.model_dump(mode="python", exclude_none=True, exclude_unset=True)
     changes: dict[str, dict[str, Any]] = {}
     for name, value in overrides.items():
-        section, _, key = name.partition(".")
-        changes.setdefault(_known_section(section, name), {})[key] = value
+        section, dot, key = name.partition(".")
+        if section not in Study.model_fields or not dot:
+            raise ConfigurationError(
+                f"no parameter '{name}'; expected 'section.key' such as 'tank.diameter_m'"
+                f"{did_you_mean(section, Study.model_fields)}"
+            )
+        changes.setdefault(section, {})[key] = value
     for section, changed in changes.items():
         kind = type(getattr(study, section))
         changed = kind.expanded(changed)
@@ -295,15 +300,6 @@ def apply_overrides(study: Study, overrides: Mapping[str, Any]) -> Study:
             kept.pop(key, None)
         kept.update({key: value for key, value in changed.items() if value is not None})
     return Study(**values)
-
-
-def _known_section(section: str, name: str) -> str:
-    if section not in Study.model_fields or "." not in name:
-        raise ConfigurationError(
-            f"no parameter '{name}'; expected 'section.key' such as 'tank.diameter_m'"
-            f"{did_you_mean(section, Study.model_fields)}"
-        )
-    return section
 
 
 @dataclass(frozen=True)
@@ -353,7 +349,8 @@ def declared(key: str) -> Declaration:
     (('immersed', 'archimedes'), 'm')
     """
     name, _, field_name = key.partition(".")
-    section = _sections().get(name)
+    of_study = Study.model_fields.get(name)
+    section: Any = None if of_study is None else of_study.annotation
     if section is None or field_name not in section.model_fields:
         raise ConfigurationError(f"a study has no key '{key}'")
     field = section.model_fields[field_name]
@@ -361,21 +358,11 @@ def declared(key: str) -> Declaration:
     placeholders = [one.text for one in field.metadata if isinstance(one, Placeholder)]
     return Declaration(
         meaning=meaning_of(section, field_name),
-        quantity=quantity_of(section, number) or item_quantity_of(section, field_name),
+        quantity=quantity_of(section, number),
         words=words_of(section, field_name),
         is_list=is_list(section, field_name),
         placeholder="".join(placeholders),
     )
-
-
-def _sections() -> dict[str, type[Section]]:
-    """Return the sections of a study by their names, without making one."""
-    kinds = {name: field.annotation for name, field in Study.model_fields.items()}
-    return {
-        name: kind
-        for name, kind in kinds.items()
-        if isinstance(kind, type) and issubclass(kind, Section)
-    }
 
 
 _HEAD = """\
@@ -489,21 +476,17 @@ def _example(kind: type[Section], key: str) -> str:
 
 def _accepted(kind: type[Section], key: str) -> str:
     """Return unit, range and words of a parameter, in short."""
-    quantity = quantity_of(kind, key) or item_quantity_of(kind, key)
-    words = words_of(kind, key)
     if kind.model_fields[key].annotation is bool:
         return "true or false"
-    parts = [_number_text(quantity)] if quantity is not None else []
+    quantity, words, parts = quantity_of(kind, key), words_of(kind, key), []
+    if quantity is not None:
+        unit = quantity.unit if quantity.unit != "1" else "number"
+        name = "whole number" if quantity.whole else unit
+        parts.append(", ".join(filter(None, (name, quantity.range_text()))))
     if words:
         parts.append(quoted(words))
     text = ", or ".join(parts)
     return f"list of {text}" if text and is_list(kind, key) else text
-
-
-def _number_text(quantity: Quantity) -> str:
-    name = "whole number" if quantity.whole else quantity.unit if quantity.unit != "1" else "number"
-    limits = quantity.range_text()
-    return f"{name}, {limits}" if limits else name
 
 
 def _comment(text: str) -> list[str]:

@@ -6,11 +6,11 @@ import json
 import math
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import Field, ModelWrapValidatorHandler, field_validator, model_validator
+from pydantic import ModelWrapValidatorHandler, field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError, FormatError
 from driftwalk.core.text_files import parse_json
-from driftwalk.model.section import Quantity, Section
+from driftwalk.model.section import Quantity, Section, not_set
 
 Vertices = tuple[tuple[float, float], ...]
 
@@ -37,17 +37,11 @@ class Outline(Section):
 
     Diameter of a circle (0.3 m when it is not given).
     """
-    width_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
-        default=None, examples=[0.4]
-    )
+    width_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = not_set(0.4)
     """Width of a rectangle, along x."""
-    height_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
-        default=None, examples=[0.3]
-    )
+    height_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = not_set(0.3)
     """Height of a rectangle, along y."""
-    vertices_m: Vertices | None = Field(
-        default=None, examples=["[[-0.1, -0.1], [0.2, -0.1], [0.0, 0.2]]"]
-    )
+    vertices_m: Vertices | None = not_set("[[-0.1, -0.1], [0.2, -0.1], [0.0, 0.2]]")
     """Corners [x, y] of a convex polygon in m, in order; stored counter-clockwise."""
 
     @model_validator(mode="wrap")

@@ -11,9 +11,10 @@ from fit_worlds import coarse_study, driven
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood import newton
 from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.likelihood.filter.parameters import Body
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.newton import EXCERPT, pieces
-from driftwalk.likelihood.preparation import body_of, series_of
+from driftwalk.likelihood.preparation import series_of
 from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
 
@@ -23,7 +24,7 @@ def _passes(seconds: float) -> Passes:
     outline = outline_of(study.tank.to_arena())
     track = body_track(driven(1, seconds, {}))
     series = series_of([track], study, "state")
-    return Passes(series, body_of(study, "state"), lay_spline(outline, side=0.03, spacing=0.03))
+    return Passes(series, Body(study, "state"), lay_spline(outline, side=0.03, spacing=0.03))
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.difference_pairs import Pair
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
-from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.filter.series import (
     FILTER,
     Series,
@@ -24,7 +24,7 @@ from driftwalk.likelihood.filter.series import (
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.law.candidate_laws import STRENGTHS
 from driftwalk.likelihood.newton import inverse, limited, newton_step
-from driftwalk.likelihood.preparation import body_of, estimate_of, series_of
+from driftwalk.likelihood.preparation import estimate_of, series_of
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
@@ -37,7 +37,7 @@ def passes(request: pytest.FixtureRequest) -> Passes:
     tracks = [body_track(recording(60.0, name)) for name in ("first", "second")]
     series = series_of(tracks, study, request.param)
     spline = lay_spline(outline, side=0.03, spacing=0.03)
-    return Passes(series, body_of(study, request.param), spline)
+    return Passes(series, Body(study, request.param), spline)
 
 
 @pytest.fixture(scope="module")
@@ -362,7 +362,8 @@ def test_noise_of_the_camera_behind_contacts_is_hardly_drag(passes: Passes) -> N
     rng = np.random.default_rng(0)
     flights, samples, drag, intensity, noise = 2400, 7, 0.45, 1e-7, 3e-4
     body = passes.body
-    rate = 0.5 * body.water_density * drag * body.side * body.depth / body.mass
+    block, water, depth = body.study.block, body.study.water, body.study.wetted_depth_m
+    rate = 0.5 * water.density_kg_m3 * drag * block.side_m * depth / block.mass_kg
     way = (-1.0) ** np.arange(flights)
     velocity = way * (0.03 + 0.003 * rng.normal(size=flights))
     place, places = -0.01 * way, []

@@ -22,8 +22,8 @@ import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood import flow_settings
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.preparation import body_of, prepare, spline_of
+from driftwalk.likelihood.filter.parameters import Body, Point
+from driftwalk.likelihood.preparation import prepare, spline_of
 
 NAMED = {"switching_times_s": [START_S + SWITCH_S], "flow_labels": ["low", "high"]}
 NUMBER = "flow_intensity_1"
@@ -40,7 +40,7 @@ def test_the_number_of_a_flow_is_the_q_of_that_flow_alone() -> None:
     study = coarse_study(**NAMED)
     ready = prepare([two_settings(1)], study, None, None)
     spline = spline_of(study)
-    passes = Passes(ready.series, body_of(study, ready.angle), spline, 2)
+    passes = Passes(ready.series, Body(study, ready.angle), spline, 2)
     coefficients = 0.05 * np.random.default_rng(2).normal(size=(2, 2, spline.rows, spline.columns))
     logs = np.log([0.4, 6e-7, 3e-4])
     point = Point(coefficients, *logs, opened={NUMBER: 1.2})

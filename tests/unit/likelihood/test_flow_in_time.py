@@ -28,8 +28,8 @@ def fit_with(numbers: Mapping[str, float], seconds: float = SECONDS) -> xr.Datas
     none = np.zeros(time.size)
     series = Series(time, none, none, none, none, none.astype(np.uint8), span=seconds)
     point = Point(np.zeros((2, 4, 4)), 0.0, 0.0, 0.0, opened=numbers)
-    data, coords, words = strength_variables(point, series)
-    return fitted(SECONDS).assign(data).assign_coords(coords).assign_attrs(words)
+    data, words = strength_variables(point, series)
+    return fitted(SECONDS).assign(data).assign_attrs(words)
 
 
 def growth(time: np.ndarray, seconds: float = SECONDS) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,16 +15,15 @@ from scipy.optimize import minimize_scalar
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.check.criteria import MODEL_CHECK
-from driftwalk.likelihood.check.measured import best_placement
+from driftwalk.likelihood.check.criteria import MODEL_CHECK, agreement_criteria
+from driftwalk.likelihood.check.measured import agreement_facts, best_placement
 from driftwalk.likelihood.measured_flow import (
     MEASURED,
     MeasuredFlow,
-    agreement_facts,
-    agreement_tests,
     measured_flow,
 )
 from driftwalk.likelihood.preparation import estimate_of, prepare, spline_of
+from driftwalk.likelihood.prior import Weights
 from driftwalk.likelihood.spline import Spline
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import build_flow_field
@@ -198,7 +198,7 @@ def test_a_scale_that_is_off_is_found_and_leaves_the_drag_alone() -> None:
 def test_the_statistic_of_agreement_has_its_distribution(monkeypatch: pytest.MonkeyPatch) -> None:
     """P values of flows and scales that are drawn as the fit takes them are uniform."""
     exact = MEASURED._replace(tolerated=0.0)
-    monkeypatch.setattr("driftwalk.likelihood.measured_flow.MEASURED", exact)
+    monkeypatch.setattr("driftwalk.likelihood.check.measured.MEASURED", exact)
     generator = np.random.default_rng(3)
     one = read(of_fit(1e-3), flow_error_m_s=1e-3)
     size, shape = one.spline.size, fitted(SECONDS)["coefficient"].shape
@@ -221,10 +221,11 @@ def test_the_statistic_of_agreement_has_its_distribution(monkeypatch: pytest.Mon
             covariance = np.linalg.inv(free + bent + prior)
             point = point + (covariance @ (score + pull)).reshape(shape)
             determined = made.determined(point, covariance, determined)
-        facts = agreement_facts(
-            made, point, free, smoothness=smooth, factors=np.ones(2), determined=determined,
-            confidence=0.9,
-        )  # fmt: skip
+        smoothness: Any = SimpleNamespace(
+            measured=made, matrix=lambda _: smooth, factors=lambda _, count: np.ones(count)
+        )
+        weights = Weights(1.0, 1.0, determined)
+        facts = agreement_facts(smoothness, weights, point, free, confidence=0.9)
         found.append((facts["measured_flow_p_value"], facts["measured_flow_scale_p_value"]))
     for p_values in np.transpose(found):
         assert 0.32 < p_values.mean() < 0.68  # 4 sd of the mean of uniform numbers
@@ -261,7 +262,7 @@ def test_a_stored_fit_has_the_same_prior() -> None:
     np.testing.assert_allclose(again.normal, first.normal, rtol=1e-6)
     np.testing.assert_allclose(again.right, first.right, rtol=1e-6)
     assert fit.attrs["measured_flow"] == "piv.csv"
-    assert [one.name for one in agreement_tests(dw.schema.answers.facts.facts_of(fit))] == [
+    assert [one.name for one in agreement_criteria(dw.schema.answers.facts.facts_of(fit))] == [
         "measured flow",
         "measured scale",
     ]

@@ -114,7 +114,7 @@ def test_without_correlation_it_is_that_of_the_filters(angle: str, memory: float
     made["x"].values[200:230] = np.nan
     made["y"].values[350, 1] += 0.01
     ready = prepare([made], STUDY, angle, None)  # type: ignore[arg-type]
-    point = first_point(ready, ready.passes.spline)
+    point = first_point(ready)
     point = replace(point, log_intensity=np.log(3e-5), log_noise=np.log(4e-4))
     if memory:
         point = point.with_extra("force_memory", memory)

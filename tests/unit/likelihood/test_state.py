@@ -201,7 +201,7 @@ def test_half_of_the_angles_make_it_the_default(track: xr.Dataset) -> None:
         blind = theta.copy()
         blind[: int(share * theta.size)] = np.nan
         recording = turned(track, blind)
-        assert use_angle([recording], [body_track(recording)], "auto") == used
+        assert use_angle([recording], [body_track(recording)], dw.Study(), "auto") == used
 
 
 @pytest.mark.slow

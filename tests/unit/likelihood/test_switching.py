@@ -25,9 +25,9 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.units import in_percent
 from driftwalk.flow import bilinear
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.flow_intervals import Intervals, cut_track, intervals_of, switched_frames
-from driftwalk.likelihood.preparation import body_of, prepare, spline_of
+from driftwalk.likelihood.preparation import prepare, spline_of
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.refuse import in_words, length_advice, needed_duration
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
@@ -127,7 +127,7 @@ def prepared(**settings: object) -> tuple[Passes, Point]:
     ready = prepare([two_flows()], study, None, None)
     spline = spline_of(study)
     flows = len(ready.intervals.labels)
-    passes = Passes(ready.series, body_of(study, ready.angle), spline, flows)
+    passes = Passes(ready.series, Body(study, ready.angle), spline, flows)
     generator = np.random.default_rng(2)
     coefficients = 0.05 * generator.normal(size=(flows, 2, spline.rows, spline.columns))
     return passes, Point(coefficients, np.log(0.4), np.log(6e-7), np.log(3e-4))

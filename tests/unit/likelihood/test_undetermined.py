@@ -245,7 +245,7 @@ BROKEN = [
 
 @pytest.mark.parametrize("error", BROKEN)
 def test_every_search_beside_the_law_may_break_down_alone(error: Any) -> None:
-    def breaks() -> LawResult:
+    def breaks(_: LawResult) -> LawResult:
         raise error
 
     search = object.__new__(LawSearch)
@@ -254,7 +254,7 @@ def test_every_search_beside_the_law_may_break_down_alone(error: Any) -> None:
         law = search._try_search(law, what, breaks)
     assert law.left_out == ("departures from it", "the other law")
     other = replace(law, floating=True, left_out=())
-    found = search._try_search(law, "another power of the drag", lambda: other)
+    found = search._try_search(law, "another power of the drag", lambda _: other)
     assert (found.floating, found.left_out) == (True, law.left_out)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -16,7 +16,6 @@ from driftwalk.likelihood.check.posterior_predictive import MotionComparison
 from driftwalk.likelihood.check.power import POWER, detectable_noncentrality, detectable_sigmas
 from driftwalk.likelihood.check.scan import Scan
 from driftwalk.likelihood.check.whiteness import WhitenessTests
-from driftwalk.likelihood.measured_flow import agreement_tests
 from driftwalk.schema.answers.facts import facts_of
 
 if TYPE_CHECKING:
@@ -175,7 +174,7 @@ def criteria_of(
         noise_criterion(found.noise_by_part, layout, by="time"),
         change_criterion(scan, layout),
         motion_criterion(motion, angle=fit.attrs["angle"]),
-        *(Criterion(*one) for one in agreement_tests(facts_of(fit))),
+        *agreement_criteria(facts_of(fit)),
     ]
 
 
@@ -428,3 +427,37 @@ def change_criterion(scan: Scan | None, layout: Layout) -> Criterion:
         "the time",
         scan.detectable,
     )
+
+
+def agreement_criteria(facts: Mapping[str, Any]) -> list[Criterion]:
+    """Ask whether a measured flow and its scale are those that move the block."""
+    if "measured_flow_p_value" not in facts:
+        return []
+    x, y = facts["measured_flow_farthest_m"]
+    expected, std = facts["measured_flow_expected"], facts["measured_flow_expected_std"]
+    found = [
+        Criterion(
+            "measured flow",
+            facts["measured_flow_p_value"],
+            "the measured flow is not the one that moves the block: chi squared of their "
+            f"difference {facts['measured_flow_chi_squared']:.0f}, expected {expected:.0f} ± "
+            f"{std:.0f}; most at x = {x:.3g} m, y = {y:.3g} m, where they are "
+            f"{1e3 * facts['measured_flow_difference_m_s']:.2g} mm/s apart: is it mirrored, "
+            "shifted, of another setting of the pumps, or are its errors larger?",
+            facts["measured_flow_detectable_m_s"],
+        )
+    ]
+    if "measured_flow_scale_p_value" in facts:
+        off = facts["measured_flow_scale"] - 1.0
+        found.append(
+            Criterion(
+                "measured scale",
+                facts["measured_flow_scale_p_value"],
+                f"the measured flow is {in_percent(abs(off))} too "
+                f"{'fast' if off > 0.0 else 'slow'} for the motion "
+                f"(± {in_percent(facts['measured_flow_scale_std'], decimals=1)}): are its length "
+                "scale and frame interval right?",
+                facts["measured_flow_scale_detectable"],
+            )
+        )
+    return found

@@ -9,7 +9,7 @@ that the check needs are collected in one pass; J itself is never held.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
@@ -24,10 +24,6 @@ from driftwalk.likelihood.spline import DEGREE, Spline, basis
 
 SAMPLES_AT_ONCE: Final = 2048
 """Rows of derivatives that are held at a time: some 20 MB."""
-
-
-WHOLE: tuple[Place, ...] = ((slice(None), slice(None)),)
-"""All columns, where they are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +82,8 @@ def velocity_at(spline: Spline, coefficients: Floats, x: Floats, y: Floats) -> F
     """Return the flow [m/s] at points, shape (2, n); NaN where a coordinate is."""
     total = np.zeros((2, x.size))
     along = []
-    for position, origin, count in (
-        (x, spline.origin_x, spline.columns),
-        (y, spline.origin_y, spline.rows),
-    ):
+    axes = ((x, spline.origin_x, spline.columns), (y, spline.origin_y, spline.rows))
+    for position, origin, count in axes:
         share = np.nan_to_num((position - origin) / spline.spacing)
         cell = np.clip(np.floor(share).astype(np.intp), 0, count - DEGREE - 1)
         along.append((cell, basis(share - cell)))
@@ -131,25 +125,18 @@ class Contrast:
         self.slope = np.zeros((self.size, parameters))
 
     def add(
-        self,
-        group: Integers,
-        weight: Floats,
-        white: Floats,
-        jacobian: Floats,
-        places: Sequence[Place] = WHOLE,
-        *,
-        pooled: int = 1,
-        moving: Integers | None = None,
+        self, part: Part, weights: Mapping[str, Floats], jacobian: Floats, moving: Integers | None
     ) -> None:
-        """Add the rows of one part; `places` says where its columns stand among all parameters.
+        """Add the rows of one part, with their weights by name.
 
-        Rows of `weight` and `jacobian` are means of `pooled` samples; `group` and `white`, shapes
-        (n, D), or (n D,) where each sample has its own, are those of all. `jacobian` holds the
-        columns `moving`, or all; the others are zero.
+        Rows of `weights` and `jacobian` are means of the part's pooled samples. `jacobian` holds
+        the columns `moving`, or all; the others are zero.
         """
         from scipy.sparse import csr_matrix
 
-        group, white, number = _pooled_rows(group, white, pooled)
+        weight = weights[self.by]
+        group = self.groups[part.series][part.start : part.start + len(part.white)]
+        group, white, number = _pooled_rows(group, part.white, part.pooled)
         retained = np.flatnonzero(group >= 0)
         if not retained.size:
             return
@@ -165,7 +152,7 @@ class Contrast:
         if moving is not None:
             known, slope = slope, np.zeros((present.size, int(moving[-1]) + 1))
             slope[:, moving] = known
-        for own, columns in places:
+        for own, columns in part.places:
             self.slope[present, columns] += slope[:, own]
 
 
@@ -202,7 +189,7 @@ class Leverage:
         return np.asarray(self.spread @ self.spread.T)
 
 
-class _Part(NamedTuple):
+class Part(NamedTuple):
     """Some samples of one series."""
 
     series: int
@@ -215,7 +202,7 @@ class _Part(NamedTuple):
     """Samples in each row of sums."""
     white: Floats
     """Shape (samples, D)."""
-    places: tuple[Place, Place]
+    places: Sequence[Place]
     """Where its columns stand among the parameters of all flows."""
     pooled: int
 
@@ -231,7 +218,7 @@ def collect(
     count = sum(len(_starts(one.series)) for one in errors)
     # Derivatives of four parts are kept, for the correction of the autocorrelation.
     chosen = set(np.linspace(0, count - 1, 4).astype(int).tolist())
-    retained: list[_Part] = []
+    retained: list[Part] = []
     for contrast in contrasts:
         contrast.begin(size)
     # J'J by flow, its lower half alone: a series has derivatives by the coefficients of its flow.
@@ -260,16 +247,7 @@ def collect(
             "drag": jacobian[:, -1],
         }
         for contrast in contrasts:
-            group = contrast.groups[part.series][part.start : part.start + len(part.white)]
-            contrast.add(
-                group,
-                weights[contrast.by],
-                part.white,
-                jacobian,
-                part.places,
-                pooled=part.pooled,
-                moving=moving,
-            )
+            contrast.add(part, weights, jacobian, moving)
     data = np.zeros((size, size))
     for flow, part_of in lower.items():
         whole = np.tril(part_of) + np.tril(part_of, -1).T
@@ -292,8 +270,8 @@ def _starts(series: Series) -> range:
 
 
 def _parts(
-    estimate: Estimate, errors: Sequence[Innovations], chosen: set[int], retained: list[_Part]
-) -> Iterator[_Part]:
+    estimate: Estimate, errors: Sequence[Innovations], chosen: set[int], retained: list[Part]
+) -> Iterator[Part]:
     """Run the filter with derivatives over every series, some samples at a time.
 
     The `chosen` parts are retained with the derivatives of every sample.
@@ -316,11 +294,11 @@ def _parts(
                 np.add.reduceat(found["used"], pools, dtype=np.float64), one.components
             )
             if whole:
-                retained.append(_Part(index, flow, start, jacobian, used, white, places, 1))
+                retained.append(Part(index, flow, start, jacobian, used, white, places, 1))
                 if pooled > 1:
                     by_sample = jacobian.reshape(len(white), -1)
                     jacobian = np.add.reduceat(by_sample, pools).reshape(used.size, -1)
-            yield _Part(index, flow, start, jacobian, used, white, places, pooled)
+            yield Part(index, flow, start, jacobian, used, white, places, pooled)
 
 
 def used_pairs(used: Bools, lags: int) -> Iterator[tuple[int, Bools]]:
@@ -330,7 +308,7 @@ def used_pairs(used: Bools, lags: int) -> Iterator[tuple[int, Bools]]:
 
 
 def _autocovariance(
-    spread: Floats, errors: Sequence[Innovations], retained: Sequence[_Part], lags: int
+    spread: Floats, errors: Sequence[Innovations], retained: Sequence[Part], lags: int
 ) -> Floats:
     """Return the mean of J C J' by component and lag, from samples of the posterior."""
     components = errors[0].components

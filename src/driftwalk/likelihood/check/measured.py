@@ -1,16 +1,18 @@
-"""A measured flow that contradicts the motion: the fit without it, and how the two flows differ."""
+"""Whether a measured flow agrees with the motion, and how it differs from the one that does."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.likelihood.check.power import POWER, detectable_sigmas
 from driftwalk.likelihood.flow_intervals import fitted_flow
-from driftwalk.likelihood.measured_flow import MeasuredFlow
+from driftwalk.likelihood.measured_flow import MEASURED, MeasuredFlow
+from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.schema import FLAGS
 from driftwalk.schema.answers.facts import fitted_value
 
@@ -121,3 +123,104 @@ def left_out_sentence(measured: MeasuredFlow, free: xr.Dataset) -> str:
         "the measured flow contradicts the motion: nothing contradicts the model without it, "
         f"with a C_d of {drag:.3g} ({low:.3g} to {high:.3g}); {how}"
     )
+
+
+def agreement_facts(
+    prior: Prior, weights: Weights, coefficients: Floats, information: Floats, confidence: float
+) -> dict[str, Any]:
+    """Return how far the motion pulls the flow away from the measured one.
+
+    The fitted flow is compared with that of the vectors and the prior of smoothness alone, in
+    errors of the vectors. `information` is that of the motion on the coefficients.
+    """
+    measured = prior.measured
+    assert measured is not None
+    from scipy.linalg import block_diag
+    from scipy.optimize import brentq
+    from scipy.special import ndtri
+    from scipy.stats import norm
+
+    flow, determined = coefficients.reshape(len(measured.own), -1), weights.determined
+    smoothness, factors = prior.matrix(weights), prior.factors(weights, len(flow))
+    k, precision = measured.scale(coefficients, determined)
+    _, score, precise = measured.deviance(coefficients, determined)
+    score = score - ((factors[:, None] * flow) @ smoothness).ravel()
+    precise = precise + block_diag(*(factor * smoothness for factor in factors))
+    alone, covariance = np.linalg.inv(precise), np.linalg.inv(precise + information)
+    off = -alone @ score
+    form = _of_difference(measured, flow, k, precision)
+    squares = float(off @ form @ off)
+    # Two estimates of which one knows more: their difference has the difference of the covariances.
+    less = alone - covariance
+    spread = form @ less
+    mean = max(float(np.trace(spread)), 1e-6)
+    half_variance = max(float((spread * spread.T).sum()), 1e-12)
+    # A chi squared with the same mean and variance (Satterthwaite).
+    unit, dof = half_variance / mean, mean**2 / half_variance
+    # A random difference of the flows, as detailed as the knots, by which the sum grows by 1.
+    shift = float(((less @ form) * (form @ less @ form).T).sum())
+    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
+    along_x, along_y = measured.spline.design(measured.x, measured.y)
+    there = np.isfinite(measured.velocity[0])
+    bases = np.outer((along_y**2).sum(axis=1), (along_x**2).sum(axis=1))[there].mean()
+    one = math.sqrt(unit * float(bases) / max(shift, 1e-300))
+    size = math.sqrt(float(np.mean(measured.velocity[:, there] ** 2)))
+    more = (MEASURED.tolerated * size / one) ** 2
+    least, most = more, 4.0 * (dof + more) + 1e3
+    limit = brentq(lambda sum_: _tail(sum_, dof, more) - MEASURED.level, 0.0, 10.0 * most)
+    detectable = brentq(lambda shift: _tail(limit, dof, shift) - POWER.share, least, most)
+    *farthest, difference = _farthest(measured, k * off)
+    found: dict[str, Any] = {
+        "measured_flow_chi_squared": squares / unit,
+        "measured_flow_expected": dof + more,
+        "measured_flow_expected_std": math.sqrt(2.0 * (dof + 2.0 * more)),
+        "measured_flow_p_value": _tail(squares / unit, dof, more),
+        "measured_flow_determined": determined,
+        "measured_flow_detectable_m_s": one * math.sqrt(detectable),
+        "measured_flow_farthest_m": farthest,
+        "measured_flow_difference_m_s": difference,
+    }
+    if measured.scale_std > 0.0:
+        variance = 1.0 / precision + (k / precision) ** 2 * float(along @ covariance @ along)
+        free = max(measured.scale_std**2 - variance, 0.0)
+        std = math.sqrt(variance)
+        reach = float(ndtri(0.5 + 0.5 * confidence)) * std
+        chance = 2.0 * float(norm.sf(abs(k - 1.0) / math.sqrt(free))) if free > 0.0 else 1.0
+        sigmas = detectable_sigmas(0.5 * MEASURED.level)
+        found |= {
+            "measured_flow_scale": k,
+            "measured_flow_scale_interval": [k - reach, k + reach],
+            "measured_flow_scale_std": std,
+            "measured_flow_scale_p_value": chance,
+            "measured_flow_scale_detectable": sigmas * math.sqrt(free),
+        }
+    return found
+
+
+def _tail(value: float, dof: float, shift: float) -> float:
+    """Return the chance of a noncentral chi squared above a value."""
+    from scipy.stats import ncx2, norm
+
+    # Where its noncentrality is large it is normal, and its series takes long.
+    if shift > 1e4:
+        return float(norm.sf((value - dof - shift) / math.sqrt(2.0 * (dof + 2.0 * shift))))
+    return float(ncx2.sf(value, dof, shift))
+
+
+def _of_difference(measured: MeasuredFlow, flow: Floats, k: float, precision: float) -> Floats:
+    """Return the quadratic form of a change of the flow in the sum of squares of the vectors."""
+    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
+    power = float(along @ flow.ravel())
+    found = measured.curvature(flow, k, math.inf)
+    share = 2.0 / precision - power / precision**2
+    return np.asarray(found - k**2 * share * np.outer(along, along))
+
+
+def _farthest(measured: MeasuredFlow, off: Floats) -> tuple[float, float, float]:
+    """Return where two flows differ most among the measured nodes, and by how much."""
+    spline = measured.spline
+    values = spline.values(off.reshape(-1, spline.rows, spline.columns), measured.x, measured.y)
+    # Of a flow that changes, the rms over time: the modes have amplitudes of unit rms.
+    size = np.where(np.isfinite(measured.velocity[0]), np.hypot.reduce(values), -1.0)
+    row, column = np.unravel_index(int(size.argmax()), size.shape)
+    return float(measured.x[column]), float(measured.y[row]), float(size[row, column])

@@ -17,6 +17,7 @@ from driftwalk.comparison import step_length_edges
 from driftwalk.comparison.statistic import StepDistance, StepTable, distances_among
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.processors import default_threads
 from driftwalk.likelihood.check.power import POWER
 from driftwalk.likelihood.check.replicates import Replicates
 from driftwalk.schema.answers.facts import GOODNESS
@@ -95,35 +96,28 @@ class MotionComparison(NamedTuple):
         return float(logs.mean()), float(spread)
 
 
-class EstimateDistances(NamedTuple):
-    """KS distances of replicates at the estimate: to the recording, and to each other."""
-
-    distance: Floats
-    floor: Floats
-
-
-def distances_at_estimate(real: Floats, found: Replicates, *, threads: int) -> EstimateDistances:
-    """Compare a recording's steps with replicates at the estimate."""
+def distances_at_estimate(real: Floats, found: Replicates) -> tuple[Floats, Floats]:
+    """Return the KS distances of replicates at the estimate: to the recording, to each other."""
     _require_replicates(found)
     half = len(found.steps) // 2
-    floor = _distances(found.steps[:half], found.steps[half:], threads)
-    return EstimateDistances(_distances([real], found.steps, threads)[0], floor.ravel())
+    floor = _distances(found.steps[:half], found.steps[half:])
+    return _distances([real], found.steps)[0], floor.ravel()
 
 
 def compare_motion(
-    real: Floats, at_estimate: EstimateDistances, drawn: Replicates, *, threads: int
+    real: Floats, at_estimate: tuple[Floats, Floats], drawn: Replicates
 ) -> MotionComparison:
     """Compare a recording's steps with simulated ones."""
     from scipy.spatial.distance import squareform
 
     _require_replicates(drawn)
-    pairs = distances_among(StepDistance(), _padded(drawn.steps), threads=threads)
+    pairs = distances_among(StepDistance(), _padded(drawn.steps), threads=default_threads())
     among = squareform(pairs)
     lengths = step_length_edges(*(steps[:, 0] for steps in (real, *drawn.steps)), bins=BINS)
     widest = max(float(np.abs(steps[:, 1]).max()) for steps in (real, *drawn.steps))
     return MotionComparison(
         *at_estimate,
-        _distances([real], drawn.steps, threads)[0],
+        _distances([real], drawn.steps)[0],
         among.sum(axis=1) / (len(among) - 1),
         _density(real, drawn, 0, lengths),
         _density(real, drawn, 1, np.linspace(-widest, widest, BINS + 1)),
@@ -139,9 +133,9 @@ def _require_replicates(found: Replicates) -> None:
         )
 
 
-def _distances(first: Sequence[Floats], second: Sequence[Floats], threads: int) -> Floats:
+def _distances(first: Sequence[Floats], second: Sequence[Floats]) -> Floats:
     """Return the KS distances of every recording to every other, (first, second)."""
-    return StepDistance().matrix(_padded(first), _padded(second), threads=threads)
+    return StepDistance().matrix(_padded(first), _padded(second), threads=default_threads())
 
 
 def _padded(steps: Sequence[Floats]) -> StepTable:

@@ -209,17 +209,11 @@ def replicates_at_estimate(
 ) -> Replicates:
     """Simulate the recordings with what the fit found."""
     drag, force = fitted_value(fit, "drag_coefficient"), fitted_value(fit, "force_std")
-    point = estimate.point
-    parts = [
-        _simulated(
-            one,
-            _keys(seed, CheckStream.ESTIMATE, index, one, count),
-            drag,
-            force * _force_factor(point, estimate.passes.series[index]),
-            point,
-        )
-        for index, one in enumerate(series)
-    ]
+    point, parts = estimate.point, []
+    for index, (one, filtered) in enumerate(zip(series, estimate.passes.series, strict=True)):
+        keys = _keys(seed, CheckStream.ESTIMATE, index, one, count)
+        own_force = force * _force_factor(point, filtered)
+        parts.append(_simulated(one, keys, drag, own_force, point))
     return _joined(parts)
 
 
@@ -240,34 +234,32 @@ def posterior_replicates(
     points, factors = _posterior_samples(fit, estimate, spread, count, seed)
     drag = fitted_value(fit, "drag_coefficient") * factors[:, 0]
     force = fitted_value(fit, "force_std") * factors[:, 1]
-    parts: list[list[_Replicate]] = []
-    for index, one in enumerate(series):
-        keys = _keys(seed, CheckStream.DRAWN, index, one, count)
-        filtered = estimate.passes.series[index]
+    spline = estimate.passes.spline
 
-        def simulated(
-            k: int, one: Replicated = one, keys: Keys = keys, filtered: Series = filtered
-        ) -> list[_Replicate]:
-            like = one.problem.like
+    def of_series(index: int) -> list[_Replicate]:
+        one, filtered = series[index], estimate.passes.series[index]
+        keys = _keys(seed, CheckStream.DRAWN, index, one, count)
+        like, begin = one.problem.like, float(filtered.time[0]) if with_path else None
+
+        def simulated(k: int) -> _Replicate:
             assert like.flow is not None
-            x, y = like.flow["x"].values, like.flow["y"].values
-            point, spline = points[k].in_flow(filtered.flow), estimate.passes.spline
-            u, v = spline.values(point.mean_coefficients, x, y)
+            point = points[k].in_flow(filtered.flow)
+            u, v = spline.values(
+                point.mean_coefficients, like.flow["x"].values, like.flow["y"].values
+            )
             mean = like.flow.assign(u=(("y", "x"), u), v=(("y", "x"), v))
             noise = like.camera.position_noise * float(factors[k, 2])
             camera = replace(like.camera, position_noise=noise)
             flow = _in_frames(mean, filtered, point, spline)
             own = replace(like, flow=flow, camera=camera, threads=1)
             drawn = replace(one, problem=replace(one.problem, like=own))
-            return _simulated(
-                drawn, keys[k : k + 1], float(drag[k]),
-                float(force[k]) * _force_factor(points[k], filtered), point,
-                float(filtered.time[0]), with_path=with_path,
-            )  # fmt: skip
+            own_force = float(force[k]) * _force_factor(points[k], filtered)
+            (world,) = _simulated(drawn, keys[k : k + 1], float(drag[k]), own_force, point, begin)
+            return world
 
-        found = map_in_threads(simulated, range(count), one.problem.like.threads)
-        parts.append([world for (world,) in found])
-    return _joined(parts)
+        return map_in_threads(simulated, range(count), like.threads)
+
+    return _joined([of_series(index) for index in range(len(series))])
 
 
 def _posterior_samples(
@@ -329,25 +321,23 @@ def _simulated(
     drag: float,
     force: float,
     point: Point,
-    begin: float = 0.0,
-    *,
-    with_path: bool = False,
+    begin: float | None = None,
 ) -> list[_Replicate]:
+    """Return replicates of a series with their steps, or with paths that begin at a time [s]."""
     time = one.problem.like.sample_time
     poses, sound = _poses(one, keys, drag, force)
     # Without the last sample of a section no velocity is taken across a restart.
     shown = np.delete(np.arange(time.size), np.append(one.first[1:] - 1, time.size - 1))
-    at = begin + time[shown]
     replicates = []
     for k, key in enumerate(keys[:, 0]):
         x, y, theta = poses[:, k].astype(np.float64)
         x, y = _as_seen(x, y, theta, time=time, point=point, key=int(key))
-        if with_path:
-            path = (at, x[shown].astype(np.float32), y[shown].astype(np.float32))
+        if begin is None:
+            steps = one.steps(x, y, theta)
+            replicates.append(_Replicate(steps, None, bool(sound[k] and len(steps) > 0)))
+        else:
+            path = begin + time[shown], x[shown].astype(np.float32), y[shown].astype(np.float32)
             replicates.append(_Replicate(np.zeros((0, 2)), path, bool(sound[k])))
-            continue
-        steps = one.steps(x, y, theta)
-        replicates.append(_Replicate(steps, None, bool(sound[k] and len(steps) > 0)))
     return replicates
 
 

@@ -9,16 +9,16 @@ import numpy as np
 
 from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.likelihood.angle_consistency import log_evidence, negated
+from driftwalk.likelihood.angle_consistency import log_evidence
 from driftwalk.likelihood.check.criteria import (
     MODEL_CHECK,
     components_of,
     criteria_of,
     distance_limit,
 )
-from driftwalk.likelihood.check.errors import Innovations, innovations_of
+from driftwalk.likelihood.check.errors import innovations_of
 from driftwalk.likelihood.check.measured import left_out_sentence
-from driftwalk.likelihood.check.place import Residuals, residuals_of
+from driftwalk.likelihood.check.place import Layout, Residuals, residuals_of
 from driftwalk.likelihood.check.posterior_predictive import (
     BAND,
     FEWEST_REPLICATES,
@@ -60,28 +60,23 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-Parts = tuple[dict[str, Any], dict[str, Any]]
-
-
-def white_variables(found: Residuals) -> Parts:
-    """Return the variables of whiteness and their coordinates."""
-    white = found.white
-    by_lag, by_component = ("component", "lag"), ("component",)
-    data = {
+def white_variables(found: Residuals) -> dict[str, Any]:
+    """Return the variables of whiteness."""
+    white, by_lag = found.white, ("component", "lag")
+    return {
+        "component": ("component", np.array(components_of(len(white.chi_squared)), dtype=object)),
+        "lag": ("lag", np.arange(1, white.autocorrelation.shape[1] + 1)),
         "autocorrelation": (by_lag, white.autocorrelation),
         "autocorrelation_expected": (by_lag, white.expected),
         "autocorrelation_std": (by_lag, white.std),
-        "chi_squared_per_dof": (by_component, white.chi_squared),
-        "chi_squared_expected": (by_component, white.expected_chi_squared),
-        "excess_kurtosis": (by_component, white.excess_kurtosis),
-        "tail_share": (by_component, white.tail_share),
+        "chi_squared_per_dof": ("component", white.chi_squared),
+        "chi_squared_expected": ("component", white.expected_chi_squared),
+        "excess_kurtosis": ("component", white.excess_kurtosis),
+        "tail_share": ("component", white.tail_share),
     }
-    names = np.array(components_of(len(white.chi_squared)), dtype=object)
-    lags = np.arange(1, white.autocorrelation.shape[1] + 1)
-    return data, {"component": ("component", names), "lag": ("lag", lags)}
 
 
-def place_variables(found: Residuals) -> Parts:
+def place_variables(found: Residuals) -> dict[str, Any]:
     """Return the variables by cell, by part of the recording and by speed."""
     layout = found.layout
     shape = (layout.y.size, layout.x.size)
@@ -95,7 +90,9 @@ def place_variables(found: Residuals) -> Parts:
     # What the largest distance of all cells exceeds once in twenty.
     cells = int(np.isfinite(place.chi_squared).sum())
     limit = {"limit": distance_limit(max(cells, 1), place.mean.shape[1])}
-    data = {
+    return {
+        "x": ("x", layout.x),
+        "y": ("y", layout.y),
         "residual": (("component", *plane), mean),
         "residual_count": (plane, place.samples.reshape(shape)),
         "residual_distance": (plane, np.sqrt(place.chi_squared).reshape(shape), limit),
@@ -112,34 +109,34 @@ def place_variables(found: Residuals) -> Parts:
         "drag_change": ("speed_range", found.drag.change),
         "drag_change_std": ("speed_range", found.drag.std),
     }
+
+
+def layout_coordinates(layout: Layout) -> dict[str, Any]:
+    """Return where the parts of the recording and the ranges of speed begin and end."""
     edges = layout.speed if layout.speed.size > 1 else np.array([np.nan, np.nan])
-    coords = {
-        "x": ("x", layout.x),
-        "y": ("y", layout.y),
+    return {
         "part_recording": ("part", [layout.recording(part) for part in range(layout.parts)]),
         "part_start": ("part", layout.start),
         "part_end": ("part", layout.end),
         "speed_low": ("speed_range", edges[:-1]),
         "speed_high": ("speed_range", edges[1:]),
     }
-    return data, coords
 
 
-def motion_variables(motion: MotionComparison) -> Parts:
-    """Return distances and densities, and their coordinates."""
+def motion_variables(motion: MotionComparison) -> dict[str, Any]:
+    """Return distances and densities."""
     data: dict[str, Any] = {
         "ks_to_estimate": ("replicate", motion.distance),
         "ks_floor": ("pair", motion.floor),
         "ks_to_drawn": ("drawn_replicate", motion.drawn_distance),
         "ks_between_drawn": ("drawn_replicate", motion.drawn_between),
     }
-    coords: dict[str, Any] = {}
     for name in ("step_length", "turning_angle"):
         density = getattr(motion, name)
+        data[f"{name}_edge"] = (f"{name}_edge", density.edge)
         for part in ("recording", "median", "low", "high"):
             data[f"{name}_density_{part}"] = (f"{name}_bin", getattr(density, part))
-        coords[f"{name}_edge"] = (f"{name}_edge", density.edge)
-    return data, coords
+    return data
 
 
 def motion_facts(motion: MotionComparison) -> dict[str, Any]:
@@ -214,7 +211,13 @@ def check_model(
     fit, many = require_fit(fit), as_list(recordings)
     estimate = estimate_of(fit, many, body=body)
     errors = innovations_of(estimate)
-    _require_used(errors)
+    used = sum(int(one.used.sum()) for one in errors)
+    if used < MODEL_CHECK.fewest_used:
+        intervals = sum(one.used.size - 1 for one in errors)
+        raise InputError(
+            f"the model cannot be checked: the fit used {used} of {intervals} intervals between "
+            f"samples, and the check needs {MODEL_CHECK.fewest_used} at least"
+        )
     try:
         found = residuals_of(estimate, errors)
     except np.linalg.LinAlgError as error:
@@ -225,7 +228,7 @@ def check_model(
     attrs: dict[str, Any] = {
         "effective_parameters": found.leverage.parameters,
         "samples": sum(one.used.size for one in errors),
-        "samples_used": sum(int(one.used.sum()) for one in errors),
+        "samples_used": used,
         "outliers": sum(int(one.outlier.sum()) for one in errors),
         "portmanteau": found.white.portmanteau,
         "portmanteau_dof": found.white.portmanteau_dof,
@@ -237,34 +240,28 @@ def check_model(
         "source": fit.attrs["source"],
         "simulated_recording": fit.attrs["simulated_recording"],
     }
-    parts = [white_variables(found), place_variables(found)]
+    variables = white_variables(found) | place_variables(found)
     try:
         seen = further_apart(estimate)
         problems = problems_of(fit, seen, many)
         states = filtered_states(seen)
-        series = restarted(problems, seen, states, every=RESTART.steps_s)
-        real, threads = recorded_steps(series, seen), problems[0].like.threads
+        series, longer = (
+            restarted(problems, seen, states, every=every)
+            for every in (RESTART.steps_s, RESTART.change_s)
+        )
+        real = recorded_steps(series, seen)
         near = distances_at_estimate(
-            real,
-            replicates_at_estimate(fit, seen, series, count=replicates, seed=seed),
-            threads=threads,
+            real, replicates_at_estimate(fit, seen, series, count=replicates, seed=seed)
         )
-        drawn = posterior_replicates(
-            fit, seen, series, found.leverage.spread, count=replicates, seed=seed
-        )
-        motion = compare_motion(real, near, drawn, threads=threads)
+        spread = found.leverage.spread
+        drawn = posterior_replicates(fit, seen, series, spread, count=replicates, seed=seed)
+        motion = compare_motion(real, near, drawn)
         free = posterior_replicates(
-            fit,
-            seen,
-            restarted(problems, seen, states, every=RESTART.change_s),
-            found.leverage.spread,
-            count=replicates,
-            seed=seed,
-            with_path=True,
+            fit, seen, longer, spread, count=replicates, seed=seed, with_path=True
         )
         paths = [(one.time, one.x, one.y) for one in seen.passes.series]
         scan = scan_of(paths, free.paths, found.layout, level=MODEL_CHECK.level)
-        parts.append(motion_variables(motion))
+        variables |= motion_variables(motion)
         attrs |= motion_facts(motion)
     except InputError as error:
         # If the steps of a recording cannot be compared, the check still tests whether its errors
@@ -273,7 +270,8 @@ def check_model(
         attrs |= {"ks_distance": np.nan, "ks_noise_floor": np.nan, "ks_left_out": str(error)}
     criteria = criteria_of(errors, found, motion, scan, fit=fit)
     verdict = verdict_on(fit, criteria, study=estimate.study)
-    data = {
+    variables |= {
+        "criterion": ("criterion", np.array([one.name for one in criteria], dtype=object)),
         "p_value": ("criterion", [one.p_value for one in criteria]),
         "failed": ("criterion", np.array([one.failed for one in criteria], dtype=np.int8)),
         "detectable": ("criterion", [one.detectable for one in criteria]),
@@ -281,26 +279,8 @@ def check_model(
         **verdict_variables(verdict),
     }
     notes = [one.note for one in criteria if one.note]
-    data |= {"note": ("note", texts(notes))} if notes else {}
-    names = np.array([one.name for one in criteria], dtype=object)
-    parts.append((data, {"criterion": ("criterion", names)}))
-    variables: dict[str, Any] = {}
-    coords: dict[str, Any] = {}
-    for some, places in parts:
-        variables |= some
-        coords |= places
-    return build_dataset("model_check", variables, coords, attrs)
-
-
-def _require_used(errors: Sequence[Innovations]) -> None:
-    """Refuse a check of so few errors that the tests of them mean nothing."""
-    used = sum(int(one.used.sum()) for one in errors)
-    if used < MODEL_CHECK.fewest_used:
-        intervals = sum(one.used.size - 1 for one in errors)
-        raise InputError(
-            f"the model cannot be checked: the fit used {used} of {intervals} intervals between "
-            f"samples, and the check needs {MODEL_CHECK.fewest_used} at least"
-        )
+    variables |= {"note": ("note", texts(notes))} if notes else {}
+    return build_dataset("model_check", variables, layout_coordinates(found.layout), attrs)
 
 
 class Judged(NamedTuple):
@@ -343,23 +323,15 @@ def judge_fit(
     """
     try:
         check = check_model(fit, recordings, body=body)
-    except InputError as error:
-        return _unchecked(fit, str(error))
-    except BREAKDOWN as error:
-        return _unchecked(
-            fit, f"the model cannot be checked: the check broke down ({reason_of(error)})"
-        )
+    except (InputError, *BREAKDOWN) as error:
+        broken = f"the model cannot be checked: the check broke down ({reason_of(error)})"
+        why = str(error) if isinstance(error, InputError) else broken
+        unknown = verdict_variables(verdict_of([], [why]))
+        return Judged(described(fit.assign(unknown).assign_attrs(check_left_out=why)), None)
     if is_against_water(facts_of(fit)):
         fit, check = _with_angle_tried(fit, check, recordings, body=body)
     check = _with_flow_left_out(fit, check, recordings, body=body)
     return Judged(with_verdict(fit, check), check)
-
-
-def _unchecked(fit: xr.Dataset, why: str) -> Judged:
-    """Return a fit of which the recording cannot tell whether it explains it."""
-    verdict = verdict_of([], [why])
-    stored = fit.assign(verdict_variables(verdict)).assign_attrs(check_left_out=why)
-    return Judged(described(stored), None)
 
 
 def _with_angle_tried(
@@ -369,7 +341,7 @@ def _with_angle_tried(
     from driftwalk.model import parse_study
 
     seen, gain = against_water(facts_of(fit)), 0.0
-    other = negated(recordings)
+    other = [one.assign(theta=-one["theta"]) for one in recordings]
     try:
         study = parse_study(fit.attrs["study"])
         alternative = fit_motion(

@@ -60,7 +60,8 @@ def verdict_on(fit: xr.Dataset, criteria: Sequence[Criterion], *, study: Study) 
     """Return the verdict on a fit from the criteria of its check and from what it says itself."""
     side, facts = study.block.side_m, facts_of(fit)
     drag_std = float(facts["drag_coefficient_relative_std"])
-    against = [*_told(fit, "flow_shape_change"), *findings_of(criteria)]
+    failed = sorted((one for one in criteria if one.failed), key=lambda one: one.p_value)
+    against = [*_told(fit, "flow_shape_change"), *(one.sentence for one in failed)]
     unable = [
         *_without_power(criteria, drag_std),
         *_too_little_seen(fit, side_m=side),
@@ -72,22 +73,14 @@ def verdict_on(fit: xr.Dataset, criteria: Sequence[Criterion], *, study: Study) 
             wall_share=INFORMATION.most_wall_share,
             lever=INFORMATION.most_lever,
         ),
-        *_told(fit, "law_unsettled"),
-        *_told(fit, "flow_modes_unsettled"),
-        *_told(fit, "stretches_unsettled"),
+        *_told(fit, "law_unsettled", "flow_modes_unsettled", "stretches_unsettled"),
     ]
     return verdict_of(against, unable)
 
 
-def _told(fit: xr.Dataset, attribute: str) -> list[str]:
-    """Return what the search of the law has found, as a reason."""
-    return [fit.attrs[attribute]] if fit.attrs.get(attribute) else []
-
-
-def findings_of(criteria: Sequence[Criterion]) -> list[str]:
-    """Return the sentences of the criteria that failed, the worst first."""
-    failed = [one for one in criteria if one.failed]
-    return [one.sentence for one in sorted(failed, key=lambda one: one.p_value)]
+def _told(fit: xr.Dataset, *attributes: str) -> list[str]:
+    """Return what the search of the law has found, as reasons."""
+    return [fit.attrs[one] for one in attributes if fit.attrs.get(one)]
 
 
 def _without_power(criteria: Sequence[Criterion], drag_std: float) -> Iterator[str]:

@@ -101,10 +101,8 @@ def whiteness_tests(
     values = np.concatenate([one.white[one.used] for one in errors])
     unit = values / np.sqrt(variance[:, 0])
     excess = (unit**4).mean(axis=0) - 3.0
-    of_kurtosis, at = (
-        np.zeros((1, number, components)),
-        np.concatenate([cluster[one.used] for one, cluster in zip(errors, clusters, strict=True)]),
-    )
+    of_kurtosis = np.zeros((1, number, components))
+    at = np.concatenate([cluster[one.used] for one, cluster in zip(errors, clusters, strict=True)])
     # The influence of a sample on the excess kurtosis.
     np.add.at(of_kurtosis[0], at, unit**4 - 6.0 * unit**2 + 3.0)
     independent = np.full(components, math.sqrt(24.0 / samples))

@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.conditions import estimated_study
-from driftwalk.core.arrays import Floats
 from driftwalk.core.progress import ignore_progress
 from driftwalk.likelihood.contacts.particles import (
     Part,
-    Passages,
     WallLikelihood,
     passages_of,
     thinned,
 )
 from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
 from driftwalk.likelihood.newton import Tell
-from driftwalk.likelihood.preparation import Estimate, estimate_of
+from driftwalk.likelihood.preparation import estimate_of
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import described
@@ -62,11 +60,9 @@ def search_walls(log_likelihood: Callable[[float, float], float], tell: Tell) ->
     """Try the walls of a coarse lattice, then of finer ones around the best of them."""
     count = len(LATTICE.restitutions) * len(LATTICE.holds) + LATTICE.fine**2 * len(LATTICE.finer)
     walls: dict[tuple[float, float], Wall] = {}
-    done = 0
-
-    def look(restitutions: Floats, holds: Floats) -> None:
-        nonlocal done
-        for restitution, hold in product(restitutions.tolist(), holds.tolist()):
+    done, places = 0, product(LATTICE.restitutions, LATTICE.holds)
+    for reach in (*LATTICE.finer, None):
+        for restitution, hold in places:
             tell(done, count, "wall")
             # The same place of two lattices may differ in its last digits.
             place = (round(restitution, 9), round(hold, 9))
@@ -74,21 +70,20 @@ def search_walls(log_likelihood: Callable[[float, float], float], tell: Tell) ->
                 found = log_likelihood(restitution, hold / (1.0 - hold))
                 walls[place] = Wall(restitution, hold, found)
             done += 1
-
-    look(np.array(LATTICE.restitutions), np.array(LATTICE.holds))
-    for wide, high in LATTICE.finer:
-        best = max(walls.values(), key=lambda wall: wall.log_likelihood)
-        look(
-            _around(best.restitution, wide, most=1.0),
-            _around(best.hold, high, most=LATTICE.most_hold),
-        )
+        if reach is not None:
+            best = max(walls.values(), key=lambda wall: wall.log_likelihood)
+            places = product(
+                _around(best.restitution, reach[0], most=1.0),
+                _around(best.hold, reach[1], most=LATTICE.most_hold),
+            )
     tell(count, count, "wall")
     return list(walls.values())
 
 
-def _around(best: float, reach: float, *, most: float) -> Floats:
+def _around(best: float, reach: float, *, most: float) -> list[float]:
     """Return the places of a finer lattice along one axis."""
-    return np.linspace(max(best - reach, 0.0), min(best + reach, most), LATTICE.fine)
+    ends = max(best - reach, 0.0), min(best + reach, most)
+    return [float(one) for one in np.linspace(*ends, LATTICE.fine)]
 
 
 class ParabolaPolicy(NamedTuple):
@@ -253,6 +248,7 @@ def estimate_wall(
             "the estimate of the wall needs the orientation of the block, and this fit used none: "
             'record it, or read the column that holds it (`columns`), and fit with `angle="state"`'
         )
+    intervals = fitted_intervals(fit)
     try:
         found = [passages_of(estimate, one) for one in estimate.passes.series]
         count = sum(len(one.x) for one in found)
@@ -263,7 +259,18 @@ def estimate_wall(
                 f"{count} can be followed: record for longer, at an even rate, or where the flow "
                 "drives the block to the wall"
             )
-        data = _answer(fit, estimate, found, seed=seed, tell=tell or ignore_progress)
+        parts = [
+            Part(
+                thinned(passages, min(1.0, WALL_CONTACT.most / count)),
+                fitted_flow(fit, interval=intervals.of_flow(series.flow)[0]),
+                float(np.median(np.diff(series.time))),
+            )
+            for series, passages in zip(estimate.passes.series, found, strict=True)
+            if len(passages.x)
+        ]
+        likelihood = WallLikelihood(estimated_study(fit), estimate.point, parts, seed)
+        walls = search_walls(likelihood.log_likelihood, tell or ignore_progress)
+        data = answer(walls, float(fit["confidence"]))
     except BREAKDOWN as error:
         return left_out(f"the estimate of the wall failed: {error}")
     if is_undetermined(data):
@@ -273,23 +280,3 @@ def estimate_wall(
             "tank (`tank`) and the side of the block (`side`)"
         )
     return described(fit.assign(data))
-
-
-def _answer(
-    fit: xr.Dataset, estimate: Estimate, found: Sequence[Passages], *, seed: int, tell: Tell
-) -> dict[str, Any]:
-    """Return restitution and friction, from the passages of each series."""
-    count = sum(len(one.x) for one in found)
-    intervals = fitted_intervals(fit)
-    parts = [
-        Part(
-            thinned(passages, min(1.0, WALL_CONTACT.most / count)),
-            fitted_flow(fit, interval=intervals.of_flow(series.flow)[0]),
-            float(np.median(np.diff(series.time))),
-        )
-        for series, passages in zip(estimate.passes.series, found, strict=True)
-        if len(passages.x)
-    ]
-    likelihood = WallLikelihood(estimated_study(fit), estimate.point, parts, seed)
-    walls = search_walls(likelihood.log_likelihood, tell)
-    return answer(walls, float(fit["confidence"]))

@@ -142,9 +142,8 @@ class WallLikelihood:
         assert point.log_angle_noise is not None
         assert point.log_lever is not None
         self.study, self.parts, self.seed = study, parts, seed
-        self.noise = PARTICLE.wider * math.exp(point.log_noise)
-        self.angle_noise = PARTICLE.wider * math.exp(point.log_angle_noise)
-        self.noises = (self.noise, self.noise, self.angle_noise)
+        logs = (point.log_noise, point.log_noise, point.log_angle_noise)
+        self.noises = [PARTICLE.wider * math.exp(one) for one in logs]
         intensity = math.exp(point.log_intensity)
         square = study.block.shape == "square"
         moment = study.block.side_m**2 / 6.0 if square else study.block.body().moment_m2
@@ -174,12 +173,12 @@ class WallLikelihood:
             running = np.isfinite(passages.x[:, k])
             if not running.any():
                 break
-            pose, motion = _propagated(model, study, state, keys, step)
-            logs = self._densities(passages, k, pose)
+            moved = _propagated(model, study, state, keys, step)
+            logs = self._densities(passages, k, moved[:3])
             top = logs.max(axis=1, keepdims=True)
             weight = np.exp(logs - top)
             total += float((np.log(weight.mean(axis=1)) + top[:, 0])[running].sum())
-            state = _resampled([*pose, *motion], weight, uniform)
+            state = _resampled(moved, weight, uniform)
             for a, noise in enumerate(self.noises):
                 rough = PARTICLE.rough * noise
                 state[a] += rough * generator.normal(size=weight.shape)
@@ -205,9 +204,9 @@ class WallLikelihood:
         seen = (passages.x[:, k, None], passages.y[:, k, None], passages.theta[:, k, None])
         apart = [one - own for one, own in zip(seen, pose, strict=True)]
         turned = wrap_angle(apart[2])
-        squares = (apart[0] ** 2 + apart[1] ** 2) / self.noise**2 + (turned / self.angle_noise) ** 2
-        size = math.log(2.0 * math.pi) * 1.5 + 2.0 * math.log(self.noise)
-        size += math.log(self.angle_noise)
+        noise, _, angle_noise = self.noises
+        squares = (apart[0] ** 2 + apart[1] ** 2) / noise**2 + (turned / angle_noise) ** 2
+        size = math.log(2.0 * math.pi) * 1.5 + 2.0 * math.log(noise) + math.log(angle_noise)
         anywhere = math.log(PARTICLE.mistake / (self.study.tank.extent_m[0] ** 2 * 2.0 * math.pi))
         # Of a passage that has ended all particles are alike.
         squares = np.where(np.isfinite(squares), squares, 0.0)
@@ -237,7 +236,7 @@ def _with_short_force_interval(study: Study, interval: float) -> Study:
 
 def _propagated(
     model: Any, study: Study, state: Sequence[Floats], keys: npt.NDArray[np.uint64], step: float
-) -> tuple[list[Floats], list[Floats]]:
+) -> list[Floats]:
     """Return poses and rates of the particles one interval later."""
     shape = state[0].shape
     start, forces = Start(*(part.ravel() for part in state)), study.forces
@@ -245,13 +244,10 @@ def _propagated(
         start, keys, drag_coefficient=forces.drag_coefficient, force_std=forces.force_std_N
     )
     found = _core.simulate(model, worlds, keys, threads=default_threads(), precision="single")
-    pose, motion = [], []
-    for name, part in zip(("x", "y", "theta"), found[:3], strict=True):
-        now, then = part[:, 0].astype(np.float64), part[:, 1].astype(np.float64)
-        change = wrap_angle(then - now) if name == "theta" else then - now
-        pose.append(now.reshape(shape))
-        motion.append((change / step).reshape(shape))
-    return pose, motion
+    poses = np.stack(found[:3]).astype(np.float64)
+    now, change = poses[:, :, 0], poses[:, :, 1] - poses[:, :, 0]
+    change[2] = wrap_angle(change[2])
+    return [one.reshape(shape) for one in (*now, *(change / step))]
 
 
 def _resampled(state: Sequence[Floats], weight: Floats, uniform: Floats) -> list[Floats]:

@@ -85,7 +85,7 @@ def difference_of(point: Point, name: str, *, shorter: float = 1.0) -> Differenc
     number, value = NUMBERS[name], point.number(name)
     most = DIFFERENCE.most_change if number.trial is None else DIFFERENCE.most_change_far
     if number.trial is not None and name not in point.opened:
-        low, high = number.tried_from(value)
+        low, high = number.trial if value == number.model else (value, value + number.step)
         return Difference(None if low == value else low, high, high - low, most)
     high = value + number.step / shorter
     return Difference(None, high, high - value, most, shortens=True)

@@ -18,7 +18,6 @@ from driftwalk.simulation.series import within_frames
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
-    from driftwalk.model.block import Block
     from driftwalk.model.rigid_bodies import RigidBody
 
 
@@ -132,38 +131,43 @@ class Point:
         return moved
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
-    """The block and the water, as arguments of the native filter."""
+    """The block and the water of a study, as the native filter takes them."""
 
-    side: float
-    mass: float
-    depth: float
-    strips: int
-    water_density: float
-    drag_speed: float
-    """Speed [m/s] at which C_d holds, whatever the power of the drag."""
+    study: Study
     orientation: str
     """"state", "given" or "none": the track's angle is measured like the position, is an input, or
     is not used."""
-    block: Block
-    hidden_share: float
-    """Share of the drag of a free face that a face between two glued blocks feels."""
+
+    @property
+    def side(self) -> float:
+        """Side of the block [m]."""
+        return self.study.block.side_m
 
     @cached_property
     def outline(self) -> RigidBody:
         """The outline of the body."""
-        return self.block.body(self.hidden_share)
+        return self.study.body()
 
     def native(self, point: Point) -> dict[str, Any]:
         """Return the arguments of the native filter."""
-        names = ("side", "mass", "depth", "strips", "water_density", "drag_speed", "orientation")
-        numbers = {name: getattr(self, name) for name in names}
-        if self.outline.is_square:
-            return numbers
+        block = self.study.block
+        numbers = {
+            "side": block.side_m,
+            "mass": block.mass_kg,
+            "depth": self.study.wetted_depth_m,
+            "strips": block.strips_per_face,
+            "water_density": self.study.water.density_kg_m3,
+            # C_d holds at this speed, whatever the power of the drag.
+            "drag_speed": self.study.forces.drag_speed_m_s,
+            "orientation": self.orientation,
+        }
         outline = self.outline
+        if outline.is_square:
+            return numbers
         if "hidden_share" in point.opened or "hidden_share" in point.fixed:
-            outline = self.block.body(point.number("hidden_share"))
+            outline = block.body(point.number("hidden_share"))
         return {
             **numbers,
             "panels": outline.panels,
@@ -172,18 +176,3 @@ class Body:
             "symmetry": max(outline.symmetry, 1),
             "round": outline.disc_radius_m > 0.0,
         }
-
-
-def body_of(study: Study, used_angle: str) -> Body:
-    """Return the block of a study as the filter takes it."""
-    return Body(
-        side=study.block.side_m,
-        mass=study.block.mass_kg,
-        depth=study.wetted_depth_m,
-        strips=study.block.strips_per_face,
-        water_density=study.water.density_kg_m3,
-        drag_speed=study.forces.drag_speed_m_s,
-        orientation=used_angle,
-        block=study.block,
-        hidden_share=study.assembly.hidden_share,
-    )

@@ -380,24 +380,22 @@ def series_of(
             # A corner is where the recorded angle puts it; the smooth one only fills its holes.
             corners = np.where(np.isfinite(track.theta), track.theta, smooth.theta)
         wall = wall_intervals(time, track.x, track.y, corners, outline=outline, block=study.block)
-        found.append(
-            Series(
-                time,
-                np.ascontiguousarray(track.x),
-                np.ascontiguousarray(track.y),
-                np.ascontiguousarray(track.theta) if used_angle == "state" else smooth.theta,
-                smooth.omega,
-                (wall | ~smooth.known).astype(np.uint8),
-                flow,
-                recording,
-                near_wall=int(wall.sum()),
-                angle=smooth.theta,
-                span=ends[recording] - first,
-                first=first,
-            )
+        one = Series(
+            time,
+            np.ascontiguousarray(track.x),
+            np.ascontiguousarray(track.y),
+            np.ascontiguousarray(track.theta) if used_angle == "state" else smooth.theta,
+            smooth.omega,
+            (wall | ~smooth.known).astype(np.uint8),
+            flow,
+            recording,
+            near_wall=int(wall.sum()),
+            angle=smooth.theta,
+            span=ends[recording] - first,
+            first=first,
         )
-        prior = velocity_prior(found[-1], FILTER.prior_reach * study.block.side_m)
-        found[-1] = replace(found[-1], velocity_prior=prior)
+        prior = velocity_prior(one, FILTER.prior_reach * study.block.side_m)
+        found.append(replace(one, velocity_prior=prior))
     return _without_contacts(found, study.block) if study.fit.interaction else found
 
 

@@ -29,9 +29,9 @@ from driftwalk.core.errors import InputError, argument_text
 from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.interval_inflation import INFLATION
 from driftwalk.likelihood.newton import Mode
-from driftwalk.likelihood.preparation import Estimate, PreparedRecordings, estimate_of
-from driftwalk.likelihood.prior import Earlier, usual_lever
-from driftwalk.likelihood.start import first_point
+from driftwalk.likelihood.preparation import Estimate, PreparedRecordings
+from driftwalk.likelihood.prior import Earlier
+from driftwalk.likelihood.start import Starts, first_point
 from driftwalk.schema.answers.facts import fitted_value
 
 if TYPE_CHECKING:
@@ -137,22 +137,16 @@ def earlier_prior(ready: PreparedRecordings, before: Estimate) -> Earlier:
     return Earlier(centre, precision, before.weights)
 
 
-def estimate_before(earlier: EarlierFit) -> Estimate:
-    """Return the earlier fit, ready to run its filter."""
-    return estimate_of(earlier.fit, earlier.recordings, body=None)
-
-
-def first_glued_point(ready: PreparedRecordings, before: Estimate) -> Point:
+def glued_start(ready: PreparedRecordings, before: Estimate) -> Starts:
     """Return where the search begins: flow and drag of one block, noises of the recording."""
-    own, body = first_point(ready, ready.passes.spline), ready.passes.body
-    lever = None if own.log_lever is None else math.log(usual_lever(body.side, body.outline))
-    return replace(
-        own,
+    cells = len(ready.study.block.body().cells)
+    point = replace(
+        first_point(ready),
         coefficients=before.point.coefficients,
         log_drag=before.point.log_drag,
-        log_intensity=before.point.log_intensity - math.log(len(body.outline.cells)),
-        log_lever=lever,
+        log_intensity=before.point.log_intensity - math.log(cells),
     )
+    return Starts(point, (point,))
 
 
 class SharedStirring(NamedTuple):
@@ -184,14 +178,19 @@ def glued_stirring(
     off = expected - observed
     squares = np.einsum("na,ab,nb->n", off, np.linalg.inv(covariance), off)
     rho = most_likely(nodes, -0.5 * squares, ready.study.fit.confidence)
-    facts: dict[str, Any] = {}
-    length = [_length_of(one, body.side) for one in rho]
-    for name, (value, *ends) in (("stirring_correlation", rho), ("stirring_length_m", length)):
-        facts |= {name: value, f"{name}_interval": ends}
+    facts = stirring_facts(rho, [_length_of(one, body.side) for one in rho])
     if len(observed) > 1:
         facts["stirring_misfit_std"] = math.sqrt(float(squares.min()))
     lengths = np.array([_length_of(float(one), body.side) for one in nodes])
     return SharedStirring(facts, length_quantiles(lengths, -0.5 * squares))
+
+
+def stirring_facts(correlation: Sequence[float], length: Sequence[float]) -> dict[str, Any]:
+    """Return the correlation at one side and the length [m], each with the ends of its interval."""
+    facts: dict[str, Any] = {}
+    for name, one in (("stirring_correlation", correlation), ("stirring_length_m", length)):
+        facts |= {name: one[0], f"{name}_interval": [*one[1:]]}
+    return facts
 
 
 def length_quantiles(lengths: Floats, log_density: Floats) -> dict[str, Any]:

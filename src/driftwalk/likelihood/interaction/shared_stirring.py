@@ -29,7 +29,12 @@ from driftwalk.likelihood.filter.difference_pairs import unpacked
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import FILTER, Series
-from driftwalk.likelihood.interaction.glued import SharedStirring, length_quantiles, most_likely
+from driftwalk.likelihood.interaction.glued import (
+    SharedStirring,
+    length_quantiles,
+    most_likely,
+    stirring_facts,
+)
 from driftwalk.likelihood.newton import thinned
 from driftwalk.likelihood.preparation import PreparedRecordings
 
@@ -229,11 +234,8 @@ def shared_stirring(
     from scipy.stats import norm
 
     alike = {(tuple(one.time), tuple(one.missing)) for one in ready.dropped}
-    bodies = len(ready.recordings)
-    groups = [
-        ready.series[k :: len(ready.series) // bodies] for k in range(len(ready.series) // bodies)
-    ]
-    filters = [joint_errors(ready.passes, point, group) for group in groups]
+    parts = len(ready.series) // len(ready.recordings)
+    filters = [joint_errors(ready.passes, point, ready.series[k::parts]) for k in range(parts)]
     apart = np.concatenate([one.apart[one.telling] for one in filters])
     if len(alike) > 1 or apart.size < SHARED.distances:
         why = "their clocks differ" if len(alike) > 1 else "no samples of two bodies at one time"
@@ -249,19 +251,23 @@ def shared_stirring(
     # Below the shortest length the bodies do not know it from zero.
     at = np.log(np.maximum(nodes, lengths[1]))
     density = np.where(nodes > 0.0, CubicSpline(logs, like[1:])(at), like[0])
+    warnings: list[str] = []
     best, low, high = most_likely(nodes, density, confidence)
-    enough = 0.5 * norm.ppf(0.5 + 0.5 * confidence) ** 2
-    if like[-1] > like.max() - enough:
+    normal = norm.ppf(0.5 + 0.5 * confidence)
+    if like[-1] > like.max() - 0.5 * normal**2:
         high = math.inf
     if low == 0.0 or like.max() - like[0] < SHARED.least_evidence:
         best = low = 0.0
-    facts, warnings = _answer((best, low, high), side, confidence)
-    length = np.array([max(facts["stirring_length_m"], 1e-3 * side)])
-    found = _by_distance(
-        filters, np.quantile(apart, np.linspace(0, 1, SHARED.distances + 1)), length
-    )
-    distance, value, std = found
-    away = (value - _rho(distance, length[0])) / std
+    if not low > 0.0:
+        known = math.isfinite(high)
+        most = f": at most {1e3 * high:.3g} mm ({in_percent(confidence)})" if known else ""
+        warnings.append(f"cannot tell a length of the stirring from none{most}")
+    rho = [float(_rho(side, max(one, 1e-3 * side))) for one in (best, low, high)]
+    facts = stirring_facts(rho, (best, low, high))
+    length = max(best, 1e-3 * side)
+    edges = np.quantile(apart, np.linspace(0, 1, SHARED.distances + 1))
+    distance, value, std = _by_distance(filters, edges, length)
+    away = (value - _rho(distance, length)) / std
     facts["stirring_misfit_std"] = float(np.abs(away).max())
     if facts["stirring_misfit_std"] > SHARED.most_departure:
         warnings.append(
@@ -269,41 +275,14 @@ def shared_stirring(
             f"{facts['stirring_misfit_std']:.1f} standard deviations off at "
             f"{100 * distance[np.abs(away).argmax()]:.3g} cm"
         )
-    half = norm.ppf(0.5 + 0.5 * confidence) * std
-    quantiles = length_quantiles(nodes, density)
-    return SharedStirring(
-        facts,
-        {
-            **(quantiles if low > 0.0 else {}),
-            "force_correlation": ("body_distance", value),
-            "force_correlation_interval": (
-                ("body_distance", "bound"),
-                np.stack([value - half, value + half], 1),
-            ),
-            "body_distance": ("body_distance", distance),
-        },
-        warnings,
-    )
-
-
-def _answer(
-    length: tuple[float, float, float], side: float, confidence: float
-) -> tuple[dict[str, Any], list[str]]:
-    """Return the length [m] and the correlation at one side with intervals; a warning for none."""
-    value, low, high = length
-    rho = [float(_rho(side, max(one, 1e-3 * side))) for one in length]
-    facts = {
-        "stirring_correlation": rho[0],
-        "stirring_correlation_interval": rho[1:],
-        "stirring_length_m": value,
-        "stirring_length_m_interval": [low, high],
+    ends = np.stack([value - normal * std, value + normal * std], 1)
+    variables = {
+        **(length_quantiles(nodes, density) if low > 0.0 else {}),
+        "force_correlation": ("body_distance", value),
+        "force_correlation_interval": (("body_distance", "bound"), ends),
+        "body_distance": ("body_distance", distance),
     }
-    if low > 0.0:
-        return facts, []
-    most = (
-        f": at most {1e3 * high:.3g} mm ({in_percent(confidence)})" if math.isfinite(high) else ""
-    )
-    return facts, [f"cannot tell a length of the stirring from none{most}"]
+    return SharedStirring(facts, variables, warnings)
 
 
 def _rho(distance: npt.ArrayLike, length: npt.ArrayLike) -> Floats:
@@ -322,7 +301,7 @@ def _summed(
 
 
 def _by_distance(
-    filters: Sequence[JointErrors], edges: Floats, length: Floats
+    filters: Sequence[JointErrors], edges: Floats, length: float
 ) -> tuple[Floats, Floats, Floats]:
     """Return mean distances, the correlations there, and their standard deviations.
 
@@ -339,7 +318,7 @@ def _by_distance(
 
     def of(errors: JointErrors) -> Correlations:
         where = np.clip(np.searchsorted(edges, errors.apart, side="right") - 1, 0, count - 1)
-        return lambda k: _rho(errors.apart[k], length[0]) + moves[:, where[k]]
+        return lambda k: _rho(errors.apart[k], length) + moves[:, where[k]]
 
     like = _summed(filters, of, len(moves))
     up, down = like[1 : count + 1], like[count + 1 :]

@@ -28,12 +28,6 @@ class Number(NamedTuple):
     """Two values between which the derivative is taken where the number is closed; by default the
     model's and one step above it."""
 
-    def tried_from(self, value: float) -> tuple[float, float]:
-        """Return the two values for the derivative where the number is closed at a value."""
-        if self.trial is not None and value == self.model:
-            return self.trial
-        return value, value + self.step
-
 
 STRENGTHS: Final = ("strength_trend", *(f"strength_{k}" for k in range(1, 7)))
 """Numbers of a slow change of the flow's strength over the recording: a straight line, then cosines
@@ -47,6 +41,7 @@ OF_PREDICTIONS: Final = ("hidden_share",)
 is wrong to the order in which the filter is. Of a dimer that was slow in the water they said 1
 where the share was 0, by seven standard deviations."""
 PULSES: Final = ("pulse_cosine", "pulse_sine")
+MODES: Final = ("mode_frequency", "mode_phase")
 INTENSITIES: Final = tuple(f"flow_intensity_{k}" for k in range(1, 64))
 """ln q in the second flow, the third and so on, less that in the first."""
 
@@ -82,9 +77,7 @@ NUMBERS: Final[Mapping[str, Number]] = {
         name: Number(0.0, 1e-4, 0.3 / max(k, 1), 0.2, -1.0, 1.0) for k, name in enumerate(STRENGTHS)
     },
     **dict.fromkeys(INTENSITIES, Number(0.0, 1e-4, 3.0, 1.0, -12.0, 12.0)),
-    "strength_0": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
-    "pulse_cosine": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
-    "pulse_sine": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
+    **dict.fromkeys(("strength_0", *PULSES), Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0)),
     "pulse_frequency": Number(0.0, 1e-7, 1e-2, 1e-3, 0.0, 10.0),
     "mode_frequency": Number(0.0, 1e-7, 1e-2, 2e-4, 0.0, 10.0),
     "mode_phase": Number(0.0, 1e-4, 2.0, 0.3, -10.0, 10.0),

@@ -14,8 +14,8 @@ from typing import Final, NamedTuple
 from driftwalk.core.units import in_percent
 from driftwalk.likelihood.filter.series import Series, usable_intervals
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, is_retained
-from driftwalk.likelihood.law.shape_changes import ShapeChange, find_shape_change
-from driftwalk.likelihood.newton import FROM_ANOTHER, Mode, ModeSearch
+from driftwalk.likelihood.law.shape_changes import shape_change
+from driftwalk.likelihood.newton import FROM_ANOTHER, Mode, converged
 
 LAW_NUMBERS: Final[Mapping[str, tuple[str, str]]] = {
     "linear_share": ("a linear part of the drag, a share", ""),
@@ -39,62 +39,51 @@ class ConfounderPolicy(NamedTuple):
 CONFOUNDER: Final = ConfounderPolicy()
 
 
-class Confounders:
-    """Tries the confounders in the recordings of one fit."""
-
-    def __init__(
-        self,
-        search: ModeSearch,
-        selection: ForwardSelection,
-        undisturbed: Callable[[], Sequence[Series]],
-    ) -> None:
-        """Keep the selection of the numbers, and what makes the undisturbed series."""
-        self.search, self.undisturbed = search, undisturbed
-        self.least, self.scores = selection.least, selection.scores
-
-    def shape_change(self, mode: Mode) -> ShapeChange | None:
-        """Return the change of the flow's shape at a mode; nothing with several flows."""
-        passes = self.search.passes
-        if passes.flows > 1:
-            return None
-        return find_shape_change(passes.series, self.scores.at(mode), side=passes.body.side)
-
-    def objections(self, mode: Mode, names: Sequence[str]) -> dict[str, str]:
-        """Return for each number of the law that a confounder explains why, in a sentence."""
-        shape = self.shape_change(mode)
-        if shape is not None and shape.significant:
-            why = "the shape of the flow changes, which can look like such a law"
-            return {name: f"{number_sentence(mode, name)} was not opened: {why}" for name in names}
-        series, usable = self.undisturbed(), usable_intervals(self.search.passes.series)
-        share = usable_intervals(series) / max(usable, 1)
-        if share > 1.0 - CONFOUNDER.least_disturbed:
-            return {}
-        alone = self.search.of(series).shortened().find(mode.point, mode.weights, held=FROM_ANOTHER)
-        return {
-            name: (
-                f"{number_sentence(mode, name)} was not opened: "
-                f"{self._without(alone, name, share)}; contacts with the wall or tracking errors "
-                "can look like such a law: record where the block stays away from the wall"
-            )
-            for name in names
-            if alone is None or not alone.converged or not self._same(mode, alone, name)
-        }
-
-    def _same(self, mode: Mode, alone: Mode, name: str) -> bool:
-        (value, _), (other, std) = mode.value_of(name), alone.value_of(name)
-        error = math.hypot(std, 0.5 * self.least.get(name, 0.0))
-        same = abs(value - other) <= CONFOUNDER.same_sigmas * error
-        return same and is_retained(alone, name, self.least)
-
-    def _without(self, alone: Mode | None, name: str, share: float) -> str:
-        left = (
-            f"the {in_percent(share)} of the intervals that are half a side or more from the wall "
-            "and not next to a gap"
+def objections_to(
+    mode: Mode,
+    names: Sequence[str],
+    selection: ForwardSelection,
+    undisturbed: Callable[[], Sequence[Series]],
+) -> dict[str, str]:
+    """Return for each number of the law that a confounder explains why, in a sentence."""
+    search, least = selection.search, selection.least
+    shape = shape_change(selection.scores, mode)
+    if shape is not None and shape.significant:
+        why = "the shape of the flow changes, which can look like such a law"
+        return {name: f"{number_sentence(mode, name)} was not opened: {why}" for name in names}
+    series = undisturbed()
+    share = usable_intervals(series) / max(usable_intervals(search.passes.series), 1)
+    if share > 1.0 - CONFOUNDER.least_disturbed:
+        return {}
+    few = search.of(series).shortened()
+    alone = converged(few.find(mode.point, mode.weights, held=FROM_ANOTHER))
+    return {
+        name: (
+            f"{number_sentence(mode, name)} was not opened: {_without(alone, name, share)}; "
+            "contacts with the wall or tracking errors can look like such a law: record where the "
+            "block stays away from the wall"
         )
-        if alone is None or not alone.converged:
-            return f"{left} do not determine it"
-        value, std = alone.value_of(name)
-        return f"in {left} it is {value:.3g} ± {std:.2g}{LAW_NUMBERS[name][1]}"
+        for name in names
+        if alone is None or not _same(mode, alone, name, least)
+    }
+
+
+def _same(mode: Mode, alone: Mode, name: str, least: Mapping[str, float]) -> bool:
+    (value, _), (other, std) = mode.value_of(name), alone.value_of(name)
+    error = math.hypot(std, 0.5 * least.get(name, 0.0))
+    same = abs(value - other) <= CONFOUNDER.same_sigmas * error
+    return same and is_retained(alone, name, least)
+
+
+def _without(alone: Mode | None, name: str, share: float) -> str:
+    left = (
+        f"the {in_percent(share)} of the intervals that are half a side or more from the wall "
+        "and not next to a gap"
+    )
+    if alone is None:
+        return f"{left} do not determine it"
+    value, std = alone.value_of(name)
+    return f"in {left} it is {value:.3g} ± {std:.2g}{LAW_NUMBERS[name][1]}"
 
 
 def number_sentence(mode: Mode, name: str) -> str:

@@ -11,18 +11,17 @@ one is a parameter. Their number is that with the most evidence.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from driftwalk.core.errors import InputError, argument_text
-from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.law.score_tests import StrengthScores
 from driftwalk.likelihood.law.search import evidence_of
-from driftwalk.likelihood.law.shape_changes import ShapeChange, find_shape_change
+from driftwalk.likelihood.law.shape_changes import ShapeChange, shape_change
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, thinned
 from driftwalk.likelihood.preparation import Estimate, PreparedRecordings
 from driftwalk.likelihood.prior import Prior, Weights
@@ -59,12 +58,8 @@ NEEDED: Final = "record for longer, or with several bodies in the tank"
 class FlowModes(NamedTuple):
     """Modes with which the law is searched, or why there are none."""
 
-    layers: int = 1
-    """Layers of the flow: its mean and the modes."""
-    start: Point | None = None
-    weights: Weights | None = None
-    opened: Mapping[str, float] = {}
-    """Numbers of the modes, with their first values."""
+    start: Mode | None = None
+    """Where the search of the law with these modes begins."""
     unsettled: str = ""
     """Why no modes were found, in a sentence."""
 
@@ -99,12 +94,6 @@ def with_layers(search: ModeSearch, layers: int) -> ModeSearch:
     return replace(search, passes=passes, prior=Prior(passes))
 
 
-def line_of(passes: Passes, mode: Mode) -> ShapeChange | None:
-    """Return the highest line in the spectra of the cells at a mode."""
-    scores = StrengthScores(passes).at(mode)
-    return find_shape_change(passes.series, scores, side=passes.body.side)
-
-
 def find_flow_modes(
     search: ModeSearch, start: Point, weights: Weights, wanted: Wanted
 ) -> FlowModes:
@@ -116,7 +105,7 @@ def find_flow_modes(
         return FlowModes()
     search = replace(search, passes=thinned(search.passes))
     steady = search.find_from_afar(start, weights)
-    line = None if steady is None else line_of(search.passes, steady)
+    line = None if steady is None else shape_change(StrengthScores(search.passes), steady)
     return modes_at(search, steady, line, wanted)
 
 
@@ -142,12 +131,12 @@ def modes_at(
     ahead = max(evidence.values()) - evidence_of(steady, search.prior)
     if wanted == "auto" and ahead < FORWARD_SELECTION.least_evidence:
         return FlowModes(unsettled=f"{NO_EVIDENCE}; {NEEDED}")
-    number = _number_of(evidence) if wanted == "auto" else int(wanted)
+    # The smaller number where the evidence does not settle it.
+    one_does = one is not None and evidence[2] - evidence[1] < FORWARD_SELECTION.least_evidence
+    number = int(wanted) if wanted != "auto" else 1 if one_does else 2
     if number not in found:
         return FlowModes(unsettled=f"{NO_SOLUTION}; {NEEDED}")
-    mode = found[number]
-    opened = {name: mode.point.opened[name] for name in _numbers(mode)}
-    return FlowModes(1 + number, mode.point, mode.weights, opened)
+    return FlowModes(found[number])
 
 
 def _best_of(search: ModeSearch, steady: Mode, candidates: Sequence[float]) -> float | None:
@@ -158,17 +147,6 @@ def _best_of(search: ModeSearch, steady: Mode, candidates: Sequence[float]) -> f
     tried = {one: _both(few, steady, one) for one in candidates}
     found = {one: mode.deviance for one, mode in tried.items() if mode is not None}
     return min(found, key=found.__getitem__) if found else None
-
-
-def _number_of(evidence: Mapping[int, float]) -> int:
-    """Return the number of modes: the smaller one where the evidence does not settle it."""
-    if 1 in evidence and evidence[2] - evidence[1] < FORWARD_SELECTION.least_evidence:
-        return 1
-    return 2
-
-
-def _numbers(mode: Mode) -> list[str]:
-    return [name for name in ("mode_frequency", "mode_phase") if name in mode.point.opened]
 
 
 def _both(search: ModeSearch, steady: Mode, frequency: float) -> Mode | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.filter.parameters import Point, body_of
+from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.law.candidate_laws import (
     CHANGES,
     DRAG_SHAPES,
@@ -152,11 +152,8 @@ def inertia_of(study: Study, point: Point) -> Inertia:
 
 def stated_drag(point: Point, study: Study) -> float:
     """Return C_d of the quadratic part of the drag, with the added mass."""
-    return (
-        inertia_of(study, point).share
-        * (1.0 - point.number("linear_share"))
-        * math.exp(point.log_drag)
-    )
+    share = inertia_of(study, point).share
+    return share * (1.0 - point.number("linear_share")) * math.exp(point.log_drag)
 
 
 def inertia_facts(inertia: Inertia, facts: dict[str, Any], normal: float) -> dict[str, Any]:
@@ -266,7 +263,7 @@ def side_slopes(
     passes, point = search.passes, restricted.point
     # A side larger by 1 %: the derivative is a difference of two steps of the search.
     larger = apply_overrides(study, {"block.side_m": (1.0 + 0.01) * study.block.side_m})
-    changed = replace(passes, body=body_of(larger, passes.body.orientation))
+    changed = replace(passes, body=Body(larger, passes.body.orientation))
     steps = []
     try:
         for one in (passes, changed):

@@ -92,12 +92,12 @@ class ForwardSelection:
         mode, tests = found.mode, found.tests
         rejected: set[str] = set()
         for index in range(FORWARD_SELECTION.rounds):
-            names = self._closed_names(mode, rejected)
             if index > 0 or tests is None:
-                tests = score_tests(self.search, mode, names) if names else None
+                tests = self._tests_of_closed(mode, rejected)
+            if tests is None:
+                break
             pulses = None
-            untried = not set(PULSES) & {*mode.point.opened, *rejected}
-            if tests is not None and self.assumptions.pulses and untried:
+            if self.assumptions.pulses and not set(PULSES) & {*mode.point.opened, *rejected}:
                 pulses = find_pulses(self.search.passes.series, self.scores.at(mode))
             candidates = self._candidates(tests, pulses)
             if not candidates:
@@ -105,23 +105,23 @@ class ForwardSelection:
             mode, idle = self._open_together_or_singly(mode, candidates, tests)
             rejected |= idle
         else:
-            names = self._closed_names(mode, rejected)
-            tests = score_tests(self.search, mode, names) if names else None
+            tests = self._tests_of_closed(mode, rejected)
         # Backward elimination: numbers that are idle since others were opened.
         opened = set(mode.point.opened) - set(self.assumptions.opened)
         mode = self.without(mode, self._idle(mode, opened)) or mode
         return replace(found, mode=mode, tests=tests)
 
-    def _closed_names(self, mode: Mode, closed: Set[str]) -> list[str]:
-        """Return the numbers that may still be opened."""
+    def _tests_of_closed(self, mode: Mode, closed: Set[str]) -> ScoreTests | None:
+        """Return the score tests of the numbers that may still be opened; None without any."""
         gone = {*mode.point.opened, *closed}
         # One shape of the drag at most is opened.
         if set(DRAG_SHAPES) & set(mode.point.opened):
             gone.update(DRAG_SHAPES)
-        return [name for name in self.assumptions.tried if name not in gone]
+        names = [name for name in self.assumptions.tried if name not in gone]
+        return score_tests(self.search, mode, names) if names else None
 
     def _open_together_or_singly(
-        self, mode: Mode, candidates: Mapping[str, float], tests: ScoreTests | None
+        self, mode: Mode, candidates: Mapping[str, float], tests: ScoreTests
     ) -> tuple[Mode, set[str]]:
         """Return the mode with numbers opened, or where nothing comes of all together, with some.
 
@@ -130,7 +130,7 @@ class ForwardSelection:
         again.
         """
         found, idle = self._open(mode, candidates)
-        parts = [] if tests is None else _parts(candidates, tests)
+        parts = _parts(candidates, tests)
         if found is not mode or len(parts) < 2:
             return found, idle
         for names in parts:
@@ -139,11 +139,9 @@ class ForwardSelection:
                 return alone, of_alone
         return found, idle
 
-    def _candidates(self, tests: ScoreTests | None, pulses: Pulses | None) -> dict[str, float]:
+    def _candidates(self, tests: ScoreTests, pulses: Pulses | None) -> dict[str, float]:
         """Return the numbers to open, with the values to begin with."""
         candidates: dict[str, float] = {}
-        if tests is None:
-            return candidates
         for name, sigmas in tests.sigmas.items():
             estimate, _ = tests.of(name)
             if name not in (*STRENGTHS, *FLOATING) and self._is_candidate(name, sigmas, estimate):

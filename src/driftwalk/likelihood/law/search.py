@@ -19,7 +19,7 @@ from driftwalk.core.units import in_percent
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.law.candidate_laws import DRAG_SHAPES, DRAGS, NUMBERS
-from driftwalk.likelihood.law.confounders import LAW_NUMBERS, Confounders, number_sentence
+from driftwalk.likelihood.law.confounders import LAW_NUMBERS, number_sentence, objections_to
 from driftwalk.likelihood.law.force_law import FLOATING, Assumptions
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult, is_retained
 from driftwalk.likelihood.law.score_tests import ScoreTests, score_tests
@@ -29,6 +29,7 @@ from driftwalk.likelihood.newton import (
     Mode,
     ModeSearch,
     beginning,
+    converged,
     require_mode,
 )
 from driftwalk.likelihood.prior import Prior, Weights
@@ -98,9 +99,8 @@ class LawSearch:
         undisturbed: Callable[[], Sequence[Series]],
     ) -> None:
         """Keep the search, and what makes the series without contacts and outliers."""
-        self.assumptions, self.search = assumptions, search
+        self.assumptions, self.search, self.undisturbed = assumptions, search, undisturbed
         self.selection = ForwardSelection(search, assumptions)
-        self.confounders = Confounders(search, self.selection, undisturbed)
 
     def find(self, starts: Starts, weights: Weights) -> LawResult:
         """Return the law and the mode that the recording supports."""
@@ -112,43 +112,27 @@ class LawSearch:
                 for one in starts.floating
             ),
         )
-        base = self._base(starts, weights)
-        found = self._try_search(base, "departures from it", lambda: self.selection.select(base))
-        if "drag_power" in self.assumptions.tried and self._turns_by_itself(base.mode):
-            found = self._try_search(
-                found,
-                "another power of the drag",
-                lambda: self._powered(base, found, starts, weights),
-            )
-        found = self._try_search(found, "the other law", lambda: self._reconsidered(found, starts))
-        found = self._try_search(found, "other explanations", lambda: self._supported(found))
-        found = self._try_search(
-            found, "a slight power of the drag", lambda: self._with_slight_power(found)
+        found = base = self._base(starts, weights)
+        further: Sequence[tuple[str, Callable[[LawResult], LawResult]]] = (
+            ("departures from it", self.selection.select),
+            ("another power of the drag", lambda law: self._powered(law, base, starts, weights)),
+            ("the other law", lambda law: self._reconsidered(law, starts)),
+            ("other explanations", self._supported),
+            ("a slight power of the drag", self._with_slight_power),
+            ("the other law", lambda law: self._with_alternative(law, starts)),
         )
-        return self._try_search(
-            found, "the other law", lambda: self._with_alternative(found, starts)
-        )
+        for what, search in further:
+            found = self._try_search(found, what, search)
+        return found
 
     def _try_search(
-        self, found: LawResult, what: str, search: Callable[[], LawResult]
+        self, found: LawResult, what: str, search: Callable[[LawResult], LawResult]
     ) -> LawResult:
         """Return what a further search finds; the law found before it where it breaks down."""
         try:
-            return replace(search(), left_out=found.left_out)
+            return replace(search(found), left_out=found.left_out)
         except BREAKDOWN:
             return replace(found, left_out=(*found.left_out, what))
-
-    def _powered(
-        self, base: LawResult, found: LawResult, starts: Starts, weights: Weights
-    ) -> LawResult:
-        """Return the law with another power of the drag where it has more evidence."""
-        powered = self._with_power(base, starts, weights)
-        if (
-            powered is not None
-            and self._ahead(powered.mode, found.mode) > FORWARD_SELECTION.least_evidence
-        ):
-            return powered
-        return found
 
     def _base(self, starts: Starts, weights: Weights) -> LawResult:
         if self.assumptions.pressure_gradient != "auto":
@@ -157,16 +141,15 @@ class LawSearch:
             mode = require_mode(self._from_afar(tries, weights))
             return self._alone(mode, floating=on)
         paper = self.search.find_from_afar(starts.paper, weights)
-        if paper is not None and paper.converged:
+        if paper is None:
+            return self._compared(starts, weights, None)
+        if paper.converged:
             tests = score_tests(self.search, paper, (*FLOATING, *self.assumptions.tried))
             if tests is not None and not self._is_doubted(tests, paper):
                 return self._undoubted(paper, tests)
-        if paper is None:
-            return self._compared(starts, weights, paper)
+        alone = self._alone(paper, floating=False)
         return self._try_search(
-            self._alone(paper, floating=False),
-            "the other law",
-            lambda: self._compared(starts, weights, paper),
+            alone, "the other law", lambda law: self._compared(starts, weights, law.mode)
         )
 
     def _is_doubted(self, tests: ScoreTests, paper: Mode) -> bool:
@@ -258,25 +241,30 @@ class LawSearch:
         lower = math.exp(value - LAW.lever_sigmas * std)
         return lower > LAW.notable_lever * self.search.passes.body.side
 
-    def _with_power(self, base: LawResult, starts: Starts, weights: Weights) -> LawResult | None:
+    def _powered(
+        self, found: LawResult, base: LawResult, starts: Starts, weights: Weights
+    ) -> LawResult:
         """Return the law with another power of the drag, where it explains why the block turns.
 
         A flow that was fitted under the power 2 can take up a drag of another one. Its score test
         is then blind, no search from there finds it, and what is left is a block whose turning its
         drag does not explain. So the search begins again. A marker that is off or pulses of the
-        flow make the block turn as well: the caller compares the law with them.
+        flow make the block turn as well: the law needs more evidence than one with them.
         """
+        if "drag_power" not in self.assumptions.tried or not self._turns_by_itself(base.mode):
+            return found
         start = starts.floating[0] if base.floating else starts.paper
         point = replace(start, opened={**start.opened, **DRAGS["power"].opened})
-        mode = self.search.find_from_afar(point, weights)
+        mode = converged(self.search.find_from_afar(point, weights))
         if (
             mode is None
-            or not mode.converged
             or not is_retained(mode, "drag_power", self.selection.least)
             or self._ahead(mode, base.mode) <= FORWARD_SELECTION.least_evidence
         ):
-            return None
-        return self.selection.select(replace(base, mode=mode, tests=None))
+            return found
+        powered = self.selection.select(replace(base, mode=mode, tests=None))
+        ahead = self._ahead(powered.mode, found.mode)
+        return powered if ahead > FORWARD_SELECTION.least_evidence else found
 
     def _reconsidered(self, found: LawResult, starts: Starts) -> LawResult:
         """Return the law, or the other one where the departures that were found are in its favour.
@@ -309,14 +297,13 @@ class LawSearch:
         fixed |= {} if found.floating else FLOATING
         tries = (starts.paper,) if found.floating else starts.floating
         points = [replace(one, opened=mode.point.opened, fixed=fixed) for one in tries]
-        alternative = self._from_afar(points, mode.weights)
-        return alternative if alternative is not None and alternative.converged else None
+        return converged(self._from_afar(points, mode.weights))
 
     def _supported(self, found: LawResult) -> LawResult:
         """Return the law without the numbers that other explanations account for."""
         mode, known = found.mode, self.assumptions.opened
         names = [name for name in LAW_NUMBERS if name in mode.point.opened and name not in known]
-        objections = self.confounders.objections(mode, names) if names else {}
+        objections = objections_to(mode, names, self.selection, self.undisturbed) if names else {}
         if not objections:
             return found
         closed = self.selection.without(mode, set(objections)) or found.base
@@ -399,7 +386,7 @@ def _mode_in(
     have to do.
     """
     few = begin.shortened().find(starts[0], weights)
-    if few is not None and few.converged:
+    if converged(few) is not None:
         return few
     tries = [(point, weights) for point in starts]
     if near is not None:
@@ -407,7 +394,7 @@ def _mode_in(
     mode = _first_converged(begin.find(point, known) for point, known in tries)
     if mode is not None and not mode.converged:
         mode = begin.find(mode.point, mode.weights, held=FROM_NEAR)
-    return mode if mode is not None and mode.converged else few
+    return converged(mode) or few
 
 
 def _first_converged(found: Iterable[Mode | None]) -> Mode | None:

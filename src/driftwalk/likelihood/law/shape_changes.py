@@ -18,7 +18,8 @@ import numpy as np
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.law.candidate_laws import STRENGTHS
-from driftwalk.likelihood.law.score_tests import Scores, ScoreTests
+from driftwalk.likelihood.law.score_tests import Scores, ScoreTests, StrengthScores
+from driftwalk.likelihood.newton import Mode
 
 
 class ShapePolicy(NamedTuple):
@@ -92,6 +93,14 @@ class ShapeChange(NamedTuple):
         )
 
 
+def shape_change(scores: StrengthScores, mode: Mode) -> ShapeChange | None:
+    """Return the change of the flow's shape at a mode; nothing with several flows."""
+    passes = scores.passes
+    if passes.flows > 1:
+        return None
+    return find_shape_change(passes.series, scores.at(mode), side=passes.body.side)
+
+
 def find_shape_change(
     series: Sequence[Series], scores: Sequence[Scores], *, side: float
 ) -> ShapeChange | None:
@@ -156,21 +165,13 @@ def _highest_line(series: Series, score: Scores, size: float) -> ShapeChange | N
             degrees[row] += 2
     if not degrees.all():
         return None
-    heights = [
-        power * float(chdtri(float(number), 0.5)) / _background(power)
-        for power, number in zip(powers, degrees, strict=True)
-    ]
-    chances = [
-        2.0 * height.size * float(chdtrc(float(number), float(height.max())))
-        for height, number in zip(heights, degrees, strict=True)
-    ]
+    background = np.stack([_background(power) for power in powers])
+    heights = powers * chdtri(degrees, 0.5)[:, None] / background
+    chances = 2.0 * heights.shape[1] * chdtrc(degrees, heights.max(axis=1))
     # On an orbit each cell is seen once a round, so that there are lines beside the change's by the
     # frequency of the orbit. At the right one the cells have one phase, or the opposite one.
     frequency = math.nan
-    together = [
-        (power + np.abs(phase)) / _background(power)
-        for power, phase in zip(powers, phased, strict=True)
-    ]
+    together = (powers + np.abs(phased)) / background
     candidates: tuple[float, ...] = ()
     if chances[0] < SHAPE.false_alarms:
         frequency = float(frequencies[inside][together[0].argmax()])
@@ -178,8 +179,8 @@ def _highest_line(series: Series, score: Scores, size: float) -> ShapeChange | N
     elif chances[1] < SHAPE.false_alarms:
         highest = [at for one in together for at in _highest(one)]
         candidates = tuple(dict.fromkeys(frequencies[inside][highest].tolist()))
-    p_value = min(1.0, *chances)
-    least = _found_nine_in_ten(float(degrees[0]), 2 * heights[0].size)
+    p_value = float(min(1.0, *chances))
+    least = _found_nine_in_ten(float(degrees[0]), 2 * heights.shape[1])
     return ShapeChange(frequency, p_value, frequency * duration, least, candidates)
 
 

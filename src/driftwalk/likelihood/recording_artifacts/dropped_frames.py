@@ -236,8 +236,6 @@ class DroppedFrames(NamedTuple):
     """Their stamps [s], shape (d,)."""
     missing: Integers
     """Number of frames that are missing there, shape (d,)."""
-    posterior: Floats
-    """Probability that any are, shape (d,)."""
     expected: Floats
     """Expected number of missing frames in every interval of the track, (n - 1,)."""
     rate: float
@@ -276,7 +274,7 @@ def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
     interval = _regular_interval(clock)
     none = np.zeros(0, dtype=np.int64)
     still = np.zeros(max(track.time.size - 1, 0))
-    nothing = DroppedFrames(none, np.zeros(0), none, np.zeros(0), still, 0.0, 0.0, interval)
+    nothing = DroppedFrames(none, np.zeros(0), none, still, 0.0, 0.0, interval)
     if math.isnan(interval) or track.time.size < DROPPED.fewest_windows + WIDTH:
         return nothing
     stamped = np.rint(np.diff(track.time) / interval)
@@ -297,8 +295,7 @@ def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
             if evidence < DROPPED.evidence:
                 return nothing._replace(evidence=evidence)
         share = _posterior(likelihood, rates)
-        some = share.sum(axis=1)
-        found = some > 0.5
+        found = share.sum(axis=1) > 0.5
         before = lengths
         lengths = stamped.copy()
         # Neighbours of a dropped frame see its true length in the next round.
@@ -313,7 +310,6 @@ def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
         after,
         track.time[after],
         (lengths - stamped)[after].astype(np.int64),
-        some[np.searchsorted(starts, after - MIDDLE)],
         still,
         float(rates[list(DROPS)].sum()),
         evidence,

@@ -19,7 +19,7 @@ from driftwalk.likelihood.check.criteria import (
     tail_criterion,
     time_and_place_criterion,
 )
-from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, velocity_at
+from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, Part, velocity_at
 from driftwalk.likelihood.check.place import (
     Layout,
     LocalMeans,
@@ -58,9 +58,16 @@ def contrast_of(
     found = Contrast([group], size)
     found.begin(PARAMETERS)
     half = ROWS // 2
-    for rows in (slice(0, half), slice(half, ROWS)):
-        found.add(group.ravel()[rows], weight[rows], white[rows], jacobian[rows])
+    for start in (0, half):
+        rows = slice(start, start + half)
+        found.add(part_of(white[rows], start), {"one": weight[rows]}, jacobian[rows], None)
     return found
+
+
+def part_of(white: np.ndarray, start: int = 0, pooled: int = 1) -> Part:
+    """Return a part of the only series, whose columns are all parameters."""
+    whole, nothing = ((slice(None), slice(None)),), np.zeros(0)
+    return Part(0, 0, start, nothing, nothing, white, whole, pooled)
 
 
 def test_sums_and_their_variance_by_dense_algebra() -> None:
@@ -368,8 +375,8 @@ def replicates(seed: int, *, count: int = 8, spread: float = 1.0) -> Replicates:
 def test_distances_and_bands_by_brute_force() -> None:
     real = np.abs(np.random.default_rng(1).normal(size=(400, 2)))
     estimate, drawn = replicates(2), replicates(3)
-    near = distances_at_estimate(real, estimate, threads=1)
-    found = compare_motion(real, near, drawn, threads=1)
+    near = distances_at_estimate(real, estimate)
+    found = compare_motion(real, near, drawn)
     assert found.distance == pytest.approx([ks_distance(real, one) for one in estimate.steps])
     pairs = [ks_distance(a, b) for a in estimate.steps[:4] for b in estimate.steps[4:]]
     assert found.floor == pytest.approx(pairs)
@@ -384,16 +391,16 @@ def test_distances_and_bands_by_brute_force() -> None:
     assert (found.turning_angle.median <= found.turning_angle.high).all()
     assert found.p_value > 0.01
     assert found.rank_p_value > 1 / 9
-    near = distances_at_estimate(1.5 * real, estimate, threads=1)
-    wide = compare_motion(1.5 * real, near, drawn, threads=1)
+    near = distances_at_estimate(1.5 * real, estimate)
+    wide = compare_motion(1.5 * real, near, drawn)
     assert wide.rank_p_value == pytest.approx(1 / 9)
     assert wide.p_value < 1e-3
 
 
 def test_steps_that_differ_are_put_into_words() -> None:
     real = 1.5 * np.abs(np.random.default_rng(1).normal(size=(400, 2)))
-    near = distances_at_estimate(real, replicates(2), threads=1)
-    motion = compare_motion(real, near, replicates(3), threads=1)
+    near = distances_at_estimate(real, replicates(2))
+    motion = compare_motion(real, near, replicates(3))
     found = {angle: motion_criterion(motion, angle=angle) for angle in ("given", "none")}
     assert found["given"].failed
     assert f"KS distance {motion.drawn_distance.mean():.3f}" in found["given"].sentence
@@ -435,7 +442,7 @@ def test_a_wrong_place_that_hardly_counts_in_the_drag_is_a_note(added: float, fa
 def test_too_few_sound_replicates_are_refused() -> None:
     few = Replicates(replicates(4).steps[:2], [[], []], 6)
     with pytest.raises(InputError, match="6 of 8 simulated recordings broke down"):
-        compare_motion(np.ones((40, 2)), replicates(5), few, threads=1)
+        compare_motion(np.ones((40, 2)), replicates(5), few)
 
 
 def test_sums_of_means_over_samples_are_those_of_all() -> None:
@@ -452,14 +459,10 @@ def test_sums_of_means_over_samples_are_those_of_all() -> None:
     whole, means = (Contrast([groups], 5) for _ in range(2))
     for one in (whole, means):
         one.begin(PARAMETERS)
-    whole.add(
-        groups.ravel(),
-        weight[every].ravel(),
-        white.ravel(),
-        jacobian[every].reshape(-1, PARAMETERS),
-    )
+    rows = jacobian[every].reshape(-1, PARAMETERS)
+    whole.add(part_of(white), {"one": weight[every].ravel()}, rows, None)
     rows = jacobian.reshape(-1, PARAMETERS)
-    means.add(groups, weight.ravel(), white, rows, pooled=pooled)
+    means.add(part_of(white, pooled=pooled), {"one": weight.ravel()}, rows, None)
     assert means.score == pytest.approx(whole.score)
     assert means.power == pytest.approx(whole.power)
     assert means.slope == pytest.approx(whole.slope)

@@ -138,7 +138,7 @@ def test_states_are_those_of_the_filter(angle: Any, memory: float) -> None:
     x, y, theta = (one + 3e-4 * noise.normal(size=one.shape) for one in parts)
     x[200:230] = np.nan
     ready = prepare([build_trajectory(time, x, y, theta)], Study(), angle, None)
-    point = first_point(ready, ready.passes.spline)
+    point = first_point(ready)
     point = replace(point, log_intensity=np.log(3e-5), log_noise=np.log(4e-4))
     if memory:
         point = point.with_extra("force_memory", memory)

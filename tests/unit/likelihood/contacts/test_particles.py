@@ -50,7 +50,8 @@ def test_the_force_is_as_strong_whatever_the_rate_of_the_camera(rate: float) -> 
     model = native_model(study, still, np.array([interval, interval + step]), Camera())
     state = [np.zeros((1, count)) for _ in range(6)]
     keys = world_keys(0, trial=0, replicate=np.arange(count))
-    pose, motion = _propagated(model, study, state, keys, step)
+    moved = _propagated(model, study, state, keys, step)
+    pose, motion = moved[:3], moved[3:]
     intensity = (1e-3 / study.block.mass_kg) ** 2 * 0.016
     # Two held draws in place of white noise: (4 + 1) / 16 in place of 1 / 3, and the rate is
     # that of the step after the sample.

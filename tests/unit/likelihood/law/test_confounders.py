@@ -12,9 +12,9 @@ from fit_worlds import coarse_study, recording
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood import fit as fitting
 from driftwalk.likelihood.filter.series import Series
-from driftwalk.likelihood.law.confounders import Confounders
-from driftwalk.likelihood.law.forward_selection import ForwardSelection, least_effects
-from driftwalk.likelihood.newton import Mode, ModeSearch
+from driftwalk.likelihood.law.confounders import objections_to
+from driftwalk.likelihood.law.forward_selection import least_effects
+from driftwalk.likelihood.newton import Mode
 from driftwalk.likelihood.preparation import PreparedRecordings, prepare
 
 Value = tuple[float, float]
@@ -32,19 +32,20 @@ def series(left_out: float) -> Series:
     return Series(time, time, time, time, time, excluded)
 
 
-def objection(alone: Mode | None, *, left_out: float = 0.6, flows: int = 2) -> str:
+def objection(alone: Mode | None, *, left_out: float = 0.6) -> str:
     """Return why a power of 2.47 ± 0.02 was not opened, given what is found without the wall."""
-    search: Any = SimpleNamespace(passes=SimpleNamespace(series=[series(0.0)], flows=flows))
+    passes = SimpleNamespace(series=[series(0.0)], flows=2)
+    search: Any = SimpleNamespace(passes=passes)
     search.of = lambda _: SimpleNamespace(shortened=lambda: SimpleNamespace(find=find))
 
     def find(*_: Any, **__: Any) -> Mode | None:
         return alone
 
-    selection = SimpleNamespace(least=least_effects(0.03), scores=None)
-    tried = Confounders(
-        cast(ModeSearch, search), cast(ForwardSelection, selection), lambda: [series(left_out)]
+    selection: Any = SimpleNamespace(
+        search=search, least=least_effects(0.03), scores=SimpleNamespace(passes=passes)
     )
-    return tried.objections(mode((2.47, 0.02)), ["drag_power"]).get("drag_power", "")
+    found = objections_to(mode((2.47, 0.02)), ["drag_power"], selection, lambda: [series(left_out)])
+    return found.get("drag_power", "")
 
 
 def test_a_power_that_the_contacts_imitate_is_not_opened() -> None:

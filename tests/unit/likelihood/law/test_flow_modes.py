@@ -26,7 +26,7 @@ from driftwalk.flow.arena import outline_of
 from driftwalk.flow.grid import make_grid
 from driftwalk.likelihood.check import replicates
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
-from driftwalk.likelihood.filter.parameters import Point, body_of
+from driftwalk.likelihood.filter.parameters import Body, Point
 from driftwalk.likelihood.filter.series import layer_strengths, mode_amplitudes, series_of
 from driftwalk.likelihood.fitted_modes import mode_variables, moving_fields, stored_frames
 from driftwalk.likelihood.law import flow_modes
@@ -48,7 +48,7 @@ def passes() -> Passes:
     study = coarse_study()
     series = series_of([body_track(recording(60.0))], study, "state")
     spline = lay_spline(outline_of(study.tank.to_arena()), side=0.03, spacing=0.03)
-    return Passes(series, body_of(study, "state"), spline, layers=2)
+    return Passes(series, Body(study, "state"), spline, layers=2)
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +158,7 @@ def test_without_a_line_there_are_no_modes(
 ) -> None:
     none: Any = object()
     modes = modes_at(none, none, found, wanted)
-    assert (modes.layers, modes.start) == (1, None)
+    assert modes.start is None
     assert modes.unsettled.startswith(said)
     assert bool(modes.unsettled) == bool(said)
 
@@ -206,22 +206,23 @@ def test_eddies_that_alternate_are_found() -> None:
     ready = prepare([made.isel(time=slice(None, None, 2))], study, "state", None)
     search = ModeSearch(ready.passes, Prior(ready.passes), study.fit.iterations)
     spline = ready.passes.spline
-    steady = search.find(first_point(ready, spline), first_weights(ready.tracks, spline))
+    steady = search.find(first_point(ready), first_weights(ready.tracks, spline))
     assert steady is not None
     assert math.exp(steady.point.log_drag) < 0.8 * DRAG
     found = modes_at(search, steady, line(1.003 / PERIOD, 1e-40), "auto")
-    assert found.layers == 2
     assert found.start is not None
-    assert found.opened["mode_frequency"] == pytest.approx(1.0 / PERIOD, rel=1e-3)
-    assert math.exp(found.start.log_drag) == pytest.approx(DRAG, rel=0.06)
+    point = found.start.point
+    assert point.layers == 2
+    assert point.opened["mode_frequency"] == pytest.approx(1.0 / PERIOD, rel=1e-3)
+    assert math.exp(point.log_drag) == pytest.approx(DRAG, rel=0.06)
     # The flow of a fit is a series over one period, whose mean is the mean flow.
     grid = make_grid(outline_of(study.tank.to_arena()), cells=50, cell_size=None)
     x, y = grid.nodes()
     seen = np.where(np.hypot(x, y) < 0.07, 9.0, 0.0).reshape(grid.shape)
-    data, coords = mode_variables(found.start, ready.series[0], spline, grid, seen)
+    data = mode_variables(point, ready.series[0], spline, grid, seen)
     assert float(data["mode_share"][1][0]) == pytest.approx(SHARE / math.sqrt(2.0), rel=0.3)
-    u, v = spline.values(found.start.mean_coefficients, grid.x, grid.y)
-    fit = xr.Dataset({**data, "u": (("y", "x"), u), "v": (("y", "x"), v)}, coords)
+    u, v = spline.values(point.mean_coefficients, grid.x, grid.y)
+    fit = xr.Dataset({**data, "u": (("y", "x"), u), "v": (("y", "x"), v)})
     found_frames = stored_frames(fit)
     assert found_frames is not None
     assert found_frames.time[-1] == pytest.approx(PERIOD, rel=1e-3)

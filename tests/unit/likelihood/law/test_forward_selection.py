@@ -88,7 +88,7 @@ def test_a_law_that_was_found_amid_departures_is_compared_again(settled_by: floa
     assumptions = assumptions_of(study, ready.angle, recordings=1, flows=1)
     modes = ModeSearch(passes, Prior(passes), study.fit.iterations)
     search = LawSearch(modes, assumptions, ready.undisturbed)
-    starts = first_points(ready, passes.spline)
+    starts = first_points(ready)
     weights = first_weights(ready.tracks, passes.spline)
     afar = replace(starts.paper, opened={"linear_share": 0.1}, fixed=dict(FLOATING))
     wrong = require_mode(search.search.find_from_afar(afar, weights))
