@@ -266,7 +266,26 @@ def write_ros(motion: Motion, folder: Path) -> list[Path]:
     # Not NAME.bag, which the programs of ROS take for a file of ROS 1.
     target = folder / f"{motion.name}_bag"
     require_free(target, existing="error")
-    _write_bag(motion.recording, target)
+    try:
+        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise InputError("a ROS bag needs rosbags: pip install 'driftwalk[ros]'") from error
+    recording = motion.recording
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    known = {key: str(value) for key, value in recording.attrs.items()}
+    x, y, theta = (recording[name].values for name in ("x", "y", "theta"))
+    with Writer(target, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        writer.set_custom_data("driftwalk", json.dumps(known))
+        connections = [
+            writer.add_connection(topic, POSE_STAMPED, typestore=store)
+            for topic in topics(recording)
+        ]
+        for row, stamp in enumerate(stamps(recording).tolist()):
+            for body in np.flatnonzero(np.isfinite(x[row]) & np.isfinite(y[row])).tolist():
+                pose = (float(x[row, body]), float(y[row, body]), float(theta[row, body]))
+                message = _message(store.types, stamp, *pose)
+                writer.write(connections[body], stamp, store.serialize_cdr(message, POSE_STAMPED))
     return [target]
 
 
@@ -347,28 +366,6 @@ def stamps(recording: xr.Dataset) -> Integers:
     seconds = np.floor(time)
     parts = np.rint((time - seconds + began) * NS_PER_S).astype(np.int64)
     return (seconds.astype(np.int64) + added) * NS_PER_S + parts
-
-
-def _write_bag(recording: xr.Dataset, path: Path) -> None:
-    try:
-        from rosbags.rosbag2 import StoragePlugin, Writer
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise InputError("a ROS bag needs rosbags: pip install 'driftwalk[ros]'") from error
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    known = {key: str(value) for key, value in recording.attrs.items()}
-    x, y, theta = (recording[name].values for name in ("x", "y", "theta"))
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        writer.set_custom_data("driftwalk", json.dumps(known))
-        connections = [
-            writer.add_connection(topic, POSE_STAMPED, typestore=store)
-            for topic in topics(recording)
-        ]
-        for row, stamp in enumerate(stamps(recording).tolist()):
-            for body in np.flatnonzero(np.isfinite(x[row]) & np.isfinite(y[row])).tolist():
-                pose = (float(x[row, body]), float(y[row, body]), float(theta[row, body]))
-                message = _message(store.types, stamp, *pose)
-                writer.write(connections[body], stamp, store.serialize_cdr(message, POSE_STAMPED))
 
 
 def _message(types: dict[str, Any], stamp: int, x: float, y: float, theta: float) -> Any:
