@@ -430,7 +430,7 @@ def chart(
     marks : sequence of mapping
         Results of `mark`.
     id, title : str
-        Where they are not those of the part of the page, see `attempt`.
+        Where the section has its own, see `attempt`.
     """
     axes = [{key: axis[key] for key in ("label", "unit", "log") if key in axis} for axis in (x, y)]
     return section(

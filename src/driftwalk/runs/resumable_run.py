@@ -238,7 +238,7 @@ def dataset_hash(
 ) -> str | None:
     """Return a hash of the coordinates and the named variables of a dataset, None without one.
 
-    Those of `where_held` are hashed where the dataset has them.
+    A variable of `where_held` is hashed where the dataset has it.
     """
     if dataset is None:
         return None

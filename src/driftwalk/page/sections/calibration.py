@@ -69,14 +69,12 @@ def calibration_sections(
         made += recording_sections(recording, body=body, noise=noise)
     if flow is not None:
         made += flow_sections(flow)
-    if calibration is None:
-        return made
     pieces: list[tuple[str, str, Maker]] = [
         ("profiles", "Along the optimum", profile_sections),
         ("bootstrap", "The bootstrap", bootstrap_section),
         ("validation", "Validation", validation_section),
     ]
-    if len(page_parameters(calibration)) != 1:
+    if calibration is not None and len(page_parameters(calibration)) != 1:
         one = one_body(recording, body)
         pieces.insert(0, ("map", "The map", lambda found: map_section(found, one)))
     return made + parts.attempts(*((*piece, calibration) for piece in pieces))
