@@ -275,8 +275,7 @@ def value_of(dataset: xr.Dataset, name: str) -> float | None:
 
 def is_simulated(dataset: xr.Dataset) -> bool:
     """Return whether a result comes from a simulated recording."""
-    words = (dataset.attrs.get(name) for name in ("simulated_recording", "simulated"))
-    return "yes" in [str(word) for word in words]
+    return "yes" in [str(dataset.attrs.get(key)) for key in ("simulated_recording", "simulated")]
 
 
 def stated_warnings(found: xr.Dataset) -> list[str]:

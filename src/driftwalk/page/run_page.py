@@ -84,8 +84,14 @@ def report_page(
     if run.state == "finished" and not run.read:
         reason = "; ".join(run.problems.values()) or "it holds no result that driftwalk can show"
         raise InputError(f"{run.folder} holds a finished run, but {reason}")
-    words = _words_of_state(run)
-    if words is not None:
+    words = None
+    if run.state != "finished":
+        since = run.manifest.get("started_utc")
+        begun = "" if since is None else f" It was begun on {since}."
+        words = (
+            f"This run is not finished.{begun} The same command continues it. This page "
+            "shows the results so far."
+        )
         state = parts.summary_section([words], [], id="state", title="Not finished")
         sections = [state, *sections]
     remarks = _remarks(run)
@@ -325,18 +331,6 @@ def _inputs(manifest: Mapping[str, Any]) -> list[dict[str, str]]:
 
 def _state(words: str | None = None, *, finished: bool = True) -> dict[str, Any]:
     return {"finished": finished, "progress": 1.0 if finished else None, "words": words}
-
-
-def _words_of_state(run: StoredRun) -> str | None:
-    """Return what there is to say about a run that has not come to its end."""
-    if run.state == "finished":
-        return None
-    since = run.manifest.get("started_utc")
-    begun = "" if since is None else f" It was begun on {since}."
-    return (
-        f"This run is not finished.{begun} The same command continues it. This page "
-        "shows the results so far."
-    )
 
 
 def _sections_of(run: RunContents, kind: RunKind) -> list[Section]:

@@ -299,11 +299,8 @@ def _tested(fit: xr.Dataset) -> Section | None:
 
 def _why(name: str, sigmas: float) -> str:
     """Return why a number that was tested is not in the fit."""
-    least = (
-        FORWARD_SELECTION.memory_sigmas
-        if name == "force_memory"
-        else FORWARD_SELECTION.opened_sigmas
-    )
+    policy = FORWARD_SELECTION
+    least = policy.memory_sigmas if name == "force_memory" else policy.opened_sigmas
     if not isfinite(sigmas):
         return "it has no estimate"
     # Chance exceeds two standard deviations in one test of twenty.

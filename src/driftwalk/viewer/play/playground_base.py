@@ -171,12 +171,11 @@ class Playground(Source):
     def _act(self, name: str) -> None:
         if name in ("pause", "run"):
             self._paused = name == "pause"
-        elif name == "clear":
-            self.motion.clear()
-        else:
+            return
+        if name == "restart":
             self._seed += 1
             self._restart()
-            self.motion.clear()
+        self.motion.clear()
 
     def _move(self, publish: Publish) -> None:
         """Advance the tank with the clock, picture by picture, until the server ends."""
