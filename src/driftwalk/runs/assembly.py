@@ -308,11 +308,10 @@ class SensitivityWork:
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers of the analysis."""
-        flows = {name: dataset_hash(flow, ("u", "v")) for name, flow in self.flows.items()}
         return {
             "study": self.study.to_dict(),
             "flow_sha256": dataset_hash(self.flow, ("u", "v")),
-            "flows_sha256": flows,
+            "flows_sha256": {key: dataset_hash(one, ("u", "v")) for key, one in self.flows.items()},
             "sobol_samples": self.samples,
             **table_hash(self.study),
         }

@@ -92,12 +92,9 @@ def write_trackpy(motion: Motion, folder: Path) -> list[Path]:
     time = recording["time"].values
     frames = frame_numbers(recording)
     particles = particle_numbers(recording)
-    columns = ["y", "x", "frame", "particle", "time_s"]
     oriented = bool(np.isfinite(recording["theta"].values).any())
     with atomic_path(target) as partial, partial.open("w", encoding="utf-8", newline="") as file:
-        header = [*columns, *(["theta_rad"] if oriented else [])]
-        pd.DataFrame(columns=header).to_csv(file, index=False)
-        for first in range(0, time.size, ROWS_AT_ONCE):
+        for first in range(0, max(time.size, 1), ROWS_AT_ONCE):
             block = slice(first, first + ROWS_AT_ONCE)
             x, y, theta = (recording[name].values[block] for name in ("x", "y", "theta"))
             row, body = np.nonzero(np.isfinite(x) & np.isfinite(y))
@@ -110,7 +107,7 @@ def write_trackpy(motion: Motion, folder: Path) -> list[Path]:
             }
             if oriented:
                 values["theta_rad"] = theta[row, body]
-            pd.DataFrame(values).to_csv(file, index=False, header=False)
+            pd.DataFrame(values).to_csv(file, index=False, header=first == 0)
     return [target]
 
 
