@@ -39,6 +39,8 @@ class KineticsWork:
         Seed of the bootstrap.
     inputs : mapping of str to Path
         The files that were read, by their role.
+    study : Study
+        For the manifest: nothing of it is used.
     """
 
     sets: Sequence[Sequence[xr.Dataset]]
@@ -46,13 +48,9 @@ class KineticsWork:
     blocks: int | None = None
     seed: int = 1
     inputs: Mapping[str, Path] = field(default_factory=dict)
+    study: Study = field(default_factory=Study)
 
     kind: ClassVar = "kinetics"
-
-    @property
-    def study(self) -> Study:
-        """For the manifest: nothing of it is used."""
-        return Study()
 
     @property
     def seeds(self) -> dict[str, int]:
