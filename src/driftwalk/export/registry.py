@@ -125,14 +125,16 @@ def _simulator(name: str, gives: str) -> Target:
     return Target(name, gives, write, verify, require)
 
 
-_ALL: Final = (
-    _simulator("mujoco", "the tank as MJCF, the water as a Python module, and verify.py"),
-    _simulator("webots", "a world, a PROTO and a physics plugin in C"),
-    _simulator("gazebo", "a world and a system plugin in C++"),
-    *DATA_TARGETS,
-    *FIGURE_TARGETS,
-)
-TARGETS: Final[dict[str, Target]] = {target.name: target for target in _ALL}
+TARGETS: Final = {
+    target.name: target
+    for target in (
+        _simulator("mujoco", "the tank as MJCF, the water as a Python module, and verify.py"),
+        _simulator("webots", "a world, a PROTO and a physics plugin in C"),
+        _simulator("gazebo", "a world and a system plugin in C++"),
+        *DATA_TARGETS,
+        *FIGURE_TARGETS,
+    )
+}
 """Every target by its name, in the order of the help."""
 
 

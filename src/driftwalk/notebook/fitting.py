@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal, Unpack
 
 from driftwalk.conditions import one_body_each, require_motion, study_for
 from driftwalk.core.errors import InputError
+from driftwalk.core.progress import ignore_progress
 from driftwalk.core.study_keys import (
     CALIBRATION_KEYS,
     FIT_KEYS,
@@ -17,15 +18,21 @@ from driftwalk.core.study_keys import (
     FitSettings,
     study_overrides,
 )
+from driftwalk.model import Study, apply_overrides
+from driftwalk.motion import BlockModel, MotionModel, models_knowing
 from driftwalk.notebook.simulating import flow_field_of
+from driftwalk.runs import (
+    CalibrationWork,
+    FitWork,
+    ModelComparisonWork,
+    Progress,
+    read_earlier_fit,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.likelihood import EarlierFit
-    from driftwalk.model import Study
-    from driftwalk.motion import MotionModel
-    from driftwalk.runs import Progress
 
 
 def fit(
@@ -97,10 +104,7 @@ def fit(
     import xarray as xr
 
     from driftwalk.likelihood import EarlierFit, fit_motion, glued_study, judge_fit
-    from driftwalk.model import Study, apply_overrides
     from driftwalk.notebook.result import as_result, run_in_folder
-    from driftwalk.runs import FitWork, read_earlier_fit
-    from driftwalk.runs.resumable_run import silent
 
     many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
     overrides = study_overrides(keys=FIT_KEYS, **settings)
@@ -116,7 +120,7 @@ def fit(
     chosen = study_for(many, study, overrides, body=body)
     if folder is not None:
         work = FitWork(many, chosen, body, {}, check=check, flow=flow, earlier=earlier)
-        return as_result(run_in_folder(folder, "fit", work, overwrite, progress or silent).fit)
+        return as_result(run_in_folder(folder, "fit", work, overwrite, progress).fit)
     found = fit_motion(many, chosen, body=body, flow=flow, earlier=earlier, tell=progress)
     return as_result(judge_fit(found, many, body=body).fit if check else found)
 
@@ -183,11 +187,7 @@ def calibrate(
     >>> found = dw.calibrate(dw.tank30_recording(), flow=dw.tank30_flow())  # doctest: +SKIP
     """
     from driftwalk.calibration import calibrate as calibrate_model
-    from driftwalk.model import Study
-    from driftwalk.motion import BlockModel
     from driftwalk.notebook.result import as_result, run_in_folder
-    from driftwalk.runs import CalibrationWork
-    from driftwalk.runs.resumable_run import silent
 
     if isinstance(model, Study):
         if study is not None:
@@ -200,11 +200,10 @@ def calibrate(
     overrides = study_overrides(keys=CALIBRATION_KEYS, **settings)
     chosen = study_for([recording], study, overrides, body=body, needs_tank=is_block)
     field = None if flow is None else flow_field_of(flow)
-    say = progress or silent
     # In a folder it is the run of the command line: either continues what the other began.
     if folder is not None:
         work = CalibrationWork(recording, chosen, field, body, {}, threads, model)
-        return as_result(run_in_folder(folder, "calibrate", work, overwrite, say, executor))
+        return as_result(run_in_folder(folder, "calibrate", work, overwrite, progress, executor))
     found = calibrate_model(
         recording,
         model,
@@ -213,7 +212,7 @@ def calibrate(
         body=body,
         threads=threads,
         executor=executor,
-        tell=lambda stage, done, total: say(done, total, stage),
+        tell=lambda stage, done, total: (progress or ignore_progress)(done, total, stage),
     )
     return as_result(found)
 
@@ -295,10 +294,7 @@ def compare_models(
     'block'
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS, compare_models as compare_all
-    from driftwalk.motion import models_knowing
     from driftwalk.notebook.result import as_result, run_in_folder
-    from driftwalk.runs import ModelComparisonWork
-    from driftwalk.runs.resumable_run import silent
 
     named = {"usual": DEFAULT_MODELS, "all": ALL_MODELS}
     asked = named.get(models, (models,)) if isinstance(models, str) else models
@@ -310,11 +306,10 @@ def compare_models(
     overrides = study_overrides(keys=CALIBRATION_KEYS, **settings)
     conditions = study_for([recording], study, overrides, body=body, needs_tank=chosen == ["block"])
     field = None if flow is None else flow_field_of(flow)
-    say = progress or silent
     # In a folder it is the run of the command line: either continues what the other began.
     if folder is not None:
         work = ModelComparisonWork(recording, chosen, conditions, field, body, {}, threads)
-        found = run_in_folder(folder, "compare_models", work, overwrite, say, executor)
+        found = run_in_folder(folder, "compare_models", work, overwrite, progress, executor)
         return as_result(found)
     found = compare_all(
         recording,
@@ -324,6 +319,6 @@ def compare_models(
         body=body,
         threads=threads,
         executor=executor,
-        tell=say,
+        tell=progress,
     )
     return as_result(found)

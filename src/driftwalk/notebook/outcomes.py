@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, Unpack
 from driftwalk.core.study_keys import ASSEMBLY_KEYS, AssemblySettings, Number, study_overrides
 from driftwalk.core.units import parse_quantity
 from driftwalk.notebook.simulating import model_of
+from driftwalk.runs import OutcomePosteriorWork, Progress, YieldWork
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.assembly.outcome_posterior.records import Outcomes
     from driftwalk.model import Study
-    from driftwalk.runs import Progress
 
 
 def infer_outcomes(
@@ -89,29 +89,21 @@ def infer_outcomes(
     ['drag_coefficient', 'force_std']
     """
     from driftwalk.assembly import infer_outcomes as infer, read_outcomes
-    from driftwalk.notebook.result import as_result, run_in_folder
-    from driftwalk.runs import OutcomePosteriorWork
-    from driftwalk.runs.resumable_run import silent
+    from driftwalk.notebook.result import as_result, counted, run_in_folder
 
-    given: Any = outcomes
     inputs = {}
     if isinstance(outcomes, (str, PathLike)):
         inputs = {"outcomes": Path(outcomes)}
-        given = read_outcomes(Path(outcomes))
+        outcomes = read_outcomes(Path(outcomes))
     found = model_of(model, flow, study_overrides(keys=ASSEMBLY_KEYS, **settings))
     chosen: dict[str, Any] = {"vary": vary, "after": after, "truths": truths}
     chosen |= {name: settings.get(name) for name in ("runs", "seed")}
     options = {name: value for name, value in chosen.items() if value is not None}
-    say = progress or silent
     if folder is not None:
-        work = OutcomePosteriorWork(given, found.flow, found.study, options, inputs, threads)
-        return as_result(run_in_folder(folder, "infer-outcomes", work, overwrite, say))
-    return as_result(
-        infer(
-            given, found.flow, found.study, **options, threads=threads,
-            progress=lambda done, total: say(done, total, "runs"),
-        )
-    )  # fmt: skip
+        work = OutcomePosteriorWork(outcomes, found.flow, found.study, options, inputs, threads)
+        return as_result(run_in_folder(folder, "infer-outcomes", work, overwrite, progress))
+    options |= {"threads": threads, "progress": counted(progress, "runs")}
+    return as_result(infer(outcomes, found.flow, found.study, **options))
 
 
 YIELD_KEYS = {**ASSEMBLY_KEYS, "seed": "sensitivity.seed"}
@@ -198,12 +190,9 @@ def maximise_yield(
     """
     from driftwalk.assembly import maximise_yield as maximise
     from driftwalk.assembly.sensitivity.settings import make_axes
-    from driftwalk.notebook.result import as_result, run_in_folder
-    from driftwalk.runs import YieldWork
-    from driftwalk.runs.resumable_run import silent
+    from driftwalk.notebook.result import as_result, counted, run_in_folder
 
     found = model_of(model, flow, study_overrides(keys=YIELD_KEYS, **settings))
-    say = progress or silent
     options: dict[str, Any] = {
         "target": target,
         "by": parse_quantity(by, "s") if isinstance(by, str) else by,
@@ -218,14 +207,9 @@ def maximise_yield(
         chosen = make_axes(found.study, axes) if axes else None
         study, flows = (found.study, {}) if chosen is None else (chosen.study, chosen.flows)
         work = YieldWork(study, found.flow, options, flows, {}, threads)
-        return as_result(
-            run_in_folder(
-                folder, "maximise_yield", work, overwrite, say, executor, warnings=found.warnings
-            )
+        done = run_in_folder(
+            folder, "maximise_yield", work, overwrite, progress, executor, warnings=found.warnings
         )
-    return as_result(
-        maximise(
-            found.study, found.flow, axes=axes, threads=threads, executor=executor,
-            progress=lambda done, total: say(done, total, "runs"), **options,
-        )
-    )  # fmt: skip
+        return as_result(done)
+    options |= {"threads": threads, "executor": executor, "progress": counted(progress, "runs")}
+    return as_result(maximise(found.study, found.flow, axes=axes, **options))

@@ -57,15 +57,13 @@ def report(
     from driftwalk.page import joined_page, name_apart, write_report
 
     if isinstance(results, (xr.Dataset, str, PathLike)):
-        many: list[Any] = [results]
-    else:
-        many = list(results)
-    if not many:
+        results = [results]
+    pages = [_page(one) for one in results]
+    if not pages:
         raise InputError("no result given: report needs one at least")
-    pages = [_page(one) for one in many]
     if len(pages) > 1:
         name_apart(pages)
-        return write_report(joined_page(pages, title=title), Path(path), existing=existing)
+        pages = [joined_page(pages, title=title)]
     return write_report(pages[0], Path(path), existing=existing)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from html import escape
 from os import PathLike
@@ -11,6 +11,7 @@ from typing import Any
 
 import xarray as xr
 
+from driftwalk.core.progress import ignore_progress
 from driftwalk.runs import Progress, Work, run_work
 from driftwalk.schema.answers.parts import lines_of
 from driftwalk.schema.runs import answer_of
@@ -56,7 +57,7 @@ def run_in_folder(
     call: str,
     work: Work,
     overwrite: bool,
-    progress: Progress,
+    progress: Progress | None,
     executor: Executor | None = None,
     *,
     warnings: Sequence[str] = (),
@@ -67,10 +68,15 @@ def run_in_folder(
         Path(folder),
         overwrite=overwrite,
         executor=executor,
-        progress=progress,
+        progress=progress or ignore_progress,
         warnings=warnings,
         command=f"driftwalk.{call}(..., folder={str(folder)!r})",
     )
+
+
+def counted(progress: Progress | None, words: str) -> Callable[[int, int], None]:
+    """Return what tells a progress how much of something is done."""
+    return lambda done, total: (progress or ignore_progress)(done, total, words)
 
 
 def answer_lines(found: xr.Dataset) -> list[str]:

@@ -7,9 +7,10 @@ from concurrent.futures import Executor
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
-from driftwalk.conditions import study_for
+from driftwalk.conditions import simulate_like, study_for
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS, AssemblySettings, study_overrides
+from driftwalk.model import Study, apply_overrides
 from driftwalk.motion import (
     BlockModel,
     MotionModel,
@@ -17,16 +18,16 @@ from driftwalk.motion import (
     estimated_values,
     simulate_motion,
 )
+from driftwalk.runs import AssemblyWork, KineticsWork, Progress, flow_of_result, read_found
 from driftwalk.schema.check import kind_name
+from driftwalk.schema.runs import kind_of
+from driftwalk.simulation import Start, simulate as simulate_study
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
     from driftwalk.comparison.ks import Ties
-    from driftwalk.model import Study
-    from driftwalk.runs import Progress
-    from driftwalk.simulation import Start
     from driftwalk.simulation.run import Backend
 
 
@@ -99,16 +100,13 @@ def simulate(
     >>> run.sizes["replicate"]
     4
     """
-    from driftwalk.conditions import simulate_like
-    from driftwalk.simulation import simulate as simulate_study
-
     common: dict[str, Any] = {"replicates": replicates, "seed": seed, "threads": threads}
     free: dict[str, Any] = {"sample_time": sample_time, "start": start}
     if isinstance(model, MotionModel):
         if backend != "cpu":
             raise InputError("a motion model is simulated by its own code: leave out `backend`")
-        given = {"flow": flow, "like": like, "body": body, **free, **common}
-        return _of_motion_model(model, parameters, study, **given)
+        free |= {"flow": flow, "like": like, "body": body}
+        return _of_motion_model(model, parameters, study, **free, **common)
     if parameters is not None or study is not None:
         raise InputError("`parameters` and `study` are for a motion model: `motion_model(...)`")
     _refuse_numbers_alone(model)
@@ -134,20 +132,17 @@ def _of_motion_model(
 ) -> xr.Dataset:
     import xarray as xr
 
-    from driftwalk.model import Study
-
-    values: Mapping[str, float]
     if isinstance(parameters, xr.Dataset):
-        values = estimated_values(parameters, model)
-    else:
-        values = parameters or {}
-    chosen = Study() if study is None else study
+        parameters = estimated_values(parameters, model)
+    chosen = study or Study()
     if like is not None:
         # A model of the user's may know no wall; a body of the family keeps to the tank.
         keeps = isinstance(model, ParticleModel | BlockModel)
         chosen = study_for([like], chosen, body=body, needs_tank=keeps)
     field = None if flow is None else flow_field_of(flow)
-    return simulate_motion(model, values, chosen, flow=field, like=like, body=body, **options)
+    return simulate_motion(
+        model, parameters or {}, chosen, flow=field, like=like, body=body, **options
+    )
 
 
 def _refuse_numbers_alone(source: Study | xr.Dataset) -> None:
@@ -291,16 +286,13 @@ def assemble(
     4
     """
     from driftwalk.assembly import assemble as assemble_study
-    from driftwalk.notebook.result import as_result, run_in_folder
-    from driftwalk.runs import AssemblyWork
-    from driftwalk.runs.resumable_run import silent
+    from driftwalk.notebook.result import as_result, counted, run_in_folder
 
     found = model_of(model, flow, study_overrides(keys=ASSEMBLY_KEYS, **settings))
-    say = progress or silent
     if folder is not None:
         work = AssemblyWork(found.study, found.flow, found.uncertainty, {}, threads)
         done = run_in_folder(
-            folder, "assemble", work, overwrite, say, executor, warnings=found.warnings
+            folder, "assemble", work, overwrite, progress, executor, warnings=found.warnings
         )
         return as_result(done.assembly)
     made = assemble_study(
@@ -308,7 +300,7 @@ def assemble(
         found.flow,
         threads=threads,
         executor=executor,
-        progress=lambda done, total: say(done, total, "runs"),
+        progress=counted(progress, "runs"),
     )
     return as_result(made)
 
@@ -347,12 +339,12 @@ def model_of(
     InputError
         When there is no flow, or the dataset is of another kind.
     """
-    from driftwalk.model import Study, apply_overrides
-    from driftwalk.runs import read_found
-    from driftwalk.schema.runs import kind_of
-
     if isinstance(source, Study):
-        return FoundModel(apply_overrides(source, overrides), _flow(flow), None)
+        if flow is None:
+            raise InputError(
+                "a study says nothing of the water: give `flow`, a flow field or a fit"
+            )
+        return FoundModel(apply_overrides(source, overrides), flow_field_of(flow), None)
     if not hasattr(source, "attrs"):
         raise InputError(
             f"a study, a fit or a calibration is needed, got {source!r}; `motion_model` makes a "
@@ -367,23 +359,15 @@ def model_of(
         )
     found = read_found(source)
     study = found.block_study(overrides)
-    field = found.flow(study) if flow is None else _flow(flow)
+    field = found.flow(study) if flow is None else flow_field_of(flow)
     undrawn = () if found.not_drawn is None else (found.not_drawn,)
     return FoundModel(study, field, found.uncertainty, (*found.warnings, *undrawn))
 
 
 def flow_field_of(flow: xr.Dataset) -> xr.Dataset:
     """Return a flow field: the given one, or that of a given fit."""
-    from driftwalk.runs import flow_of_result
-
     held = flow_of_result(flow)
     return flow if held is None else held
-
-
-def _flow(flow: xr.Dataset | None) -> xr.Dataset:
-    if flow is None:
-        raise InputError("a study says nothing of the water: give `flow`, a flow field or a fit")
-    return flow_field_of(flow)
 
 
 def kinetics(
@@ -441,18 +425,11 @@ def kinetics(
     """
     from driftwalk.assembly import kinetics as estimate
     from driftwalk.assembly.chains.histories import datasets_of
-    from driftwalk.notebook.result import as_result, run_in_folder
-    from driftwalk.runs import KineticsWork
-    from driftwalk.runs.resumable_run import silent
+    from driftwalk.notebook.result import as_result, counted, run_in_folder
 
-    say = progress or silent
     if folder is not None:
         given = [datasets_of(one) for one in (runs, other) if one is not None]
         work = KineticsWork(given, target, blocks, seed)
-        return as_result(run_in_folder(folder, "kinetics", work, overwrite, say))
-    return as_result(
-        estimate(
-            runs, other, target=target, blocks=blocks, seed=seed,
-            progress=lambda done, total: say(done, total, "models"),
-        )
-    )  # fmt: skip
+        return as_result(run_in_folder(folder, "kinetics", work, overwrite, progress))
+    tell = counted(progress, "models")
+    return as_result(estimate(runs, other, target=target, blocks=blocks, seed=seed, progress=tell))

@@ -145,9 +145,7 @@ def number(value: Any) -> float | None:
     >>> number(np.float64(0.5)), number(float("nan")), number(None)
     (0.5, None, None)
     """
-    if value is None:
-        return None
-    found = float(value)
+    found = math.nan if value is None else float(value)
     return found if math.isfinite(found) else None
 
 

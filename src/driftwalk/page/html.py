@@ -147,9 +147,10 @@ def report_html(
             "form-action 'none'",
         ]
     )
+    title = " · ".join(str(page[key]) for key in ("title", "subtitle") if page.get(key))
     return _REPORT.format(
         policy=policy,
-        title=_text(_title(page)),
+        title=_text(title or "driftwalk"),
         style=style,
         page=embedded(page),
         more="" if core is None else _CORE.format(core=embedded(core), worker=bundle_file(WORKER)),
@@ -233,11 +234,6 @@ def embedded(page: Mapping[str, Any]) -> str:
         raise InputError(f"the page cannot be written as JSON: {error}") from error
     # `<`, `>` and `&` occur in JSON only inside strings, where an escape means the same.
     return text.translate(_ESCAPES)
-
-
-def _title(page: Mapping[str, Any]) -> str:
-    parts = (page.get("title"), page.get("subtitle"))
-    return " · ".join(str(part) for part in parts if part) or "driftwalk"
 
 
 def _text(value: str) -> str:

@@ -158,8 +158,9 @@ def empty_section(id: str, title: str, reason: str) -> Section:
 def attempt(id: str, title: str, make: Callable[[], Section | list[Section]]) -> list[Section]:
     """Make sections; what the data do not allow becomes an empty section with the reason.
 
-    Another program may have written the data in another form: that costs the section, and not the
-    page. Errors that no data explain are faults of driftwalk, and pass.
+    A section without an id or a title of its own gets the given one. Another program may have
+    written the data in another form: that costs the section, and not the page. Errors that no data
+    explain are faults of driftwalk, and pass.
     """
     try:
         made = make()
@@ -170,7 +171,10 @@ def attempt(id: str, title: str, make: Callable[[], Section | list[Section]]) ->
         words = f"{type(error).__name__}: {error}"[:200]
         reason = f"The data are not in the form that this version of driftwalk reads ({words})."
         return [empty_section(id, title, reason)]
-    return made if isinstance(made, list) else [made]
+    return [
+        {**part, "id": part["id"] or id, "title": part["title"] or title}
+        for part in (made if isinstance(made, list) else [made])
+    ]
 
 
 def sections_of(
@@ -218,23 +222,28 @@ def summary_section(
 
 
 def table_section(
-    id: str, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]], note: str = ""
+    columns: Sequence[str],
+    rows: Iterable[Sequence[Any]],
+    note: str = "",
+    *,
+    id: str = "",
+    title: str = "",
 ) -> Section:
     """Return a table; cells that a row lacks at its end stay empty."""
     filled = [[*row, *[""] * (len(columns) - len(row))] for row in rows]
     return section(id, "table", title, note or None, columns=list(columns), rows=filled)
 
 
-def section_of_table(id: str, title: str, table: Table, note: str = "") -> Section:
+def section_of_table(table: Table, note: str = "", **named: str) -> Section:
     """Return a table of an answer as a section."""
-    return table_section(id, title, table.columns, table.rows, note)
+    return table_section(table.columns, table.rows, note, **named)
 
 
 def table_part(
     id: str, title: str, table_of: Callable[[Any], Table], note: str = ""
 ) -> tuple[str, str, Maker]:
     """Return a part of a page that is one table of an answer, for `sections_of`."""
-    return id, title, lambda found: section_of_table(id, title, table_of(found), note)
+    return id, title, lambda found: section_of_table(table_of(found), note)
 
 
 def answer_table(answer: Answer) -> Table:
@@ -266,8 +275,7 @@ def value_of(dataset: xr.Dataset, name: str) -> float | None:
 
 def is_simulated(dataset: xr.Dataset) -> bool:
     """Return whether a result comes from a simulated recording."""
-    words = (dataset.attrs.get(name) for name in ("simulated_recording", "simulated"))
-    return "yes" in [str(word) for word in words]
+    return "yes" in [str(dataset.attrs.get(key)) for key in ("simulated_recording", "simulated")]
 
 
 def stated_warnings(found: xr.Dataset) -> list[str]:
@@ -399,20 +407,20 @@ Style = Literal["line", "points", "step"]
 
 
 def chart(
-    id: str,
-    title: str,
     note: str | None = None,
     *,
     x: Mapping[str, Any],
     y: Mapping[str, Any],
     series: Sequence[Mapping[str, Any]],
     marks: Sequence[Mapping[str, Any]] = (),
+    id: str = "",
+    title: str = "",
 ) -> Section:
     """Return a section of kind "lines".
 
     Parameters
     ----------
-    id, title, note : str
+    note : str, optional
         As of every section.
     x, y : mapping
         Result of `label`, or the axis of a map.
@@ -420,6 +428,8 @@ def chart(
         Results of `series`.
     marks : sequence of mapping
         Results of `mark`.
+    id, title : str
+        Where the section has its own, see `attempt`.
     """
     axes = [{key: axis[key] for key in ("label", "unit", "log") if key in axis} for axis in (x, y)]
     return section(

@@ -84,8 +84,14 @@ def report_page(
     if run.state == "finished" and not run.read:
         reason = "; ".join(run.problems.values()) or "it holds no result that driftwalk can show"
         raise InputError(f"{run.folder} holds a finished run, but {reason}")
-    words = _words_of_state(run)
-    if words is not None:
+    words = None
+    if run.state != "finished":
+        since = run.manifest.get("started_utc")
+        begun = "" if since is None else f" It was begun on {since}."
+        words = (
+            f"This run is not finished.{begun} The same command continues it. This page "
+            "shows the results so far."
+        )
         state = parts.summary_section([words], [], id="state", title="Not finished")
         sections = [state, *sections]
     remarks = _remarks(run)
@@ -298,7 +304,7 @@ def manifest_section(manifest: Mapping[str, Any]) -> Section:
     known = software.get("driftwalk") if isinstance(software, Mapping) else None
     version = str(known or __version__)
     return parts.section(
-        "manifest", "manifest", "How to reproduce this",
+        "manifest", "manifest", _REPRODUCE,
         "The command reproduces the same numbers from the same inputs.",
         command=str(manifest.get("command", "")),
         entries=json_value(entries),
@@ -325,18 +331,6 @@ def _inputs(manifest: Mapping[str, Any]) -> list[dict[str, str]]:
 
 def _state(words: str | None = None, *, finished: bool = True) -> dict[str, Any]:
     return {"finished": finished, "progress": 1.0 if finished else None, "words": words}
-
-
-def _words_of_state(run: StoredRun) -> str | None:
-    """Return what there is to say about a run that has not come to its end."""
-    if run.state == "finished":
-        return None
-    since = run.manifest.get("started_utc")
-    begun = "" if since is None else f" It was begun on {since}."
-    return (
-        f"This run is not finished.{begun} The same command continues it. This page "
-        "shows the results so far."
-    )
 
 
 def _sections_of(run: RunContents, kind: RunKind) -> list[Section]:
@@ -373,13 +367,11 @@ def _with_remarks(sections: list[Section], remarks: list[str]) -> list[Section]:
 
 
 _OPEN: Final = frozenset({"summary", "state", "warnings"})
-_LAW: Final = "The force law, and what else was tested"
-_RECORDING: Final = "The recording"
 _REPRODUCE: Final = "How to reproduce this"
-_DETAILS: Final = "The results in detail"
+_LAW: Final = ("law", "laws", "tested", "stirring", "wall")
 _CHAPTERS: Final = {
-    **dict.fromkeys(("law", "laws", "tested", "stirring", "wall"), _LAW),
-    **dict.fromkeys(("recording", "tracking"), _RECORDING),
+    **dict.fromkeys(_LAW, "The force law, and what else was tested"),
+    **dict.fromkeys(("recording", "tracking"), "The recording"),
     "flow": "The flow",
     "check": "Does the model explain the recording?",
     "manifest": _REPRODUCE,
@@ -415,27 +407,23 @@ def in_chapters(
     >>> [(part["id"], part["chapter"], part.get("picture")) for part in made]
     [('summary', None, 'flow'), ('flow', 'The flow', None)]
     """
-    made = [{**part, "chapter": _chapter(part)} for part in sections]
+    made = [{**part, "chapter": _chapter(part["id"])} for part in sections]
     order = list(dict.fromkeys(part["chapter"] for part in made))
     made.sort(key=lambda part: (part["chapter"] is not None, order.index(part["chapter"])))
     for part in made:
         if part["id"] == "summary" and part["kind"] == "summary":
             part["picture"] = _picture(made)
-            part["next"] = [] if result is None else _next(result, name)
+            advice = "" if result is None else following_of(result).advice
+            part["next"] = [advice.replace("{run}", quote(name))] if advice else []
     return made
 
 
-def _chapter(part: Section) -> str | None:
-    return None if part["id"] in _OPEN else _CHAPTERS.get(part["id"].partition("-")[0], _DETAILS)
+def _chapter(id: str) -> str | None:
+    return None if id in _OPEN else _CHAPTERS.get(id.partition("-")[0], "The results in detail")
 
 
 def _picture(sections: Sequence[Section]) -> str | None:
     """Return the id of the section that shows the result best."""
-    found = [(_PICTURES.index(one["kind"]), one) for one in sections if one["kind"] in _PICTURES]
-    return str(min(found, key=lambda pair: pair[0])[1]["id"]) if found else None
-
-
-def _next(result: xr.Dataset, name: str) -> list[str]:
-    """Return what to do after a run: a sentence with a command."""
-    advice = following_of(result).advice
-    return [advice.replace("{run}", quote(name))] if advice else []
+    shown = [one for one in sections if one["kind"] in _PICTURES]
+    best = min(shown, key=lambda one: _PICTURES.index(one["kind"]), default=None)
+    return None if best is None else str(best["id"])

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, fields, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.runs.resumable_run import dataset_hash
+from driftwalk.runs.resumable_run import FLOW_ERRORS, dataset_hash
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -118,14 +119,12 @@ class AssemblyWork:
         from driftwalk.assembly.runs.draws import drawn_from
 
         found = self.calibration
-        source = "" if found is None else drawn_from(found)
-        drawn_names = COVARIANCE if source == "covariance" else REGION
+        by_covariance = found is not None and drawn_from(found) == "covariance"
         drawn = {key: values.tolist() for key, values in self.quantiles.items()}
-        names = ("u", "v", *(f"{part}_standard_error" for part in "uv"))
         return {
             "study": self.study.to_dict(),
-            "flow_sha256": dataset_hash(self.flow, tuple(n for n in names if n in self.flow)),
-            "calibration_sha256": dataset_hash(found, drawn_names),
+            "flow_sha256": dataset_hash(self.flow, ("u", "v"), where_held=FLOW_ERRORS),
+            "calibration_sha256": dataset_hash(found, COVARIANCE if by_covariance else REGION),
             **({"quantiles": drawn} if drawn else {}),
             **table_hash(self.study),
         }
@@ -142,7 +141,6 @@ class AssemblyWork:
         )
 
         settings, table = self.study.assembly, table_hash(self.study)
-        drawn = sizes_drawn = None
         staged = run.staged_progress(self._usual_parts())
         how: dict[str, Any] = {"threads": self.threads, "executor": run.executor}
         assembly = assemble(
@@ -154,17 +152,15 @@ class AssemblyWork:
             **how,
         )
         assembly = run.keep_result(assembly)
-        distribution, sizes = self._outcomes(assembly, run, "")
+        self._keep_outcomes(assembly, run, "")
         pull = attraction(self.study)
         if pull is not None:
-            pull = run.keep("attraction.nc", pull)
-        times = run.keep("class_times.nc", class_times(assembly, confidence=settings.confidence))
-        steady = None
+            run.keep("attraction.nc", pull)
+        run.keep("class_times.nc", class_times(assembly, confidence=settings.confidence))
         if settings.bonds_break:
-            steady = steady_state(assembly, confidence=settings.confidence)
-            steady = run.keep("steady_state.nc", steady)
+            run.keep("steady_state.nc", steady_state(assembly, confidence=settings.confidence))
         if self.calibration is not None:
-            assembly_drawn = assemble_drawn(
+            drawn = assemble_drawn(
                 self.study,
                 self.flow,
                 self.calibration,
@@ -174,8 +170,8 @@ class AssemblyWork:
                 progress=staged.stage("runs, drawn parameters"),
                 **how,
             )
-            run.keep("assembly_drawn.nc", assembly_drawn)
-            drawn, sizes_drawn = self._outcomes(assembly_drawn, run, "_drawn")
+            run.keep("assembly_drawn.nc", drawn)
+            self._keep_outcomes(drawn, run, "_drawn")
         # Paths would fill a disk: a few runs are simulated again, with the same random numbers.
         path = assembly_path(
             self.study,
@@ -198,24 +194,21 @@ class AssemblyWork:
             staged.begin("film")
             film = run.directory.folder("figures") / f"run.{self.film}"
             driftwalk.plot.write_animation(path, film)
-        return AssemblyResult(
-            assembly, distribution, times, drawn, sizes, sizes_drawn, steady, pull
-        )
+        kept: dict[str, Any] = {
+            one.name: run.datasets.get(f"{one.name}.nc") for one in fields(AssemblyResult)
+        }
+        return AssemblyResult(**kept)
 
-    def _outcomes(
-        self, assembly: xr.Dataset, run: Run, ending: str
-    ) -> tuple[xr.Dataset, xr.Dataset | None]:
-        """Return the distribution of a set of runs and, beyond 8 blocks, their sizes."""
+    def _keep_outcomes(self, assembly: xr.Dataset, run: Run, ending: str) -> None:
+        """Keep the distribution of a set of runs and, beyond 8 blocks, their sizes."""
         from driftwalk.assembly import assembly_sizes, outcome_distribution
         from driftwalk.assembly.outcomes.outcome_classes import MOST_BLOCKS
 
         confidence = self.study.assembly.confidence
         distribution = outcome_distribution(assembly, confidence=confidence)
-        distribution = run.keep(f"distribution{ending}.nc", distribution)
-        if self.study.assembly.blocks <= MOST_BLOCKS:
-            return distribution, None
-        sizes = assembly_sizes(assembly, confidence=confidence)
-        return distribution, run.keep(f"sizes{ending}.nc", sizes)
+        run.keep(f"distribution{ending}.nc", distribution)
+        if self.study.assembly.blocks > MOST_BLOCKS:
+            run.keep(f"sizes{ending}.nc", assembly_sizes(assembly, confidence=confidence))
 
     def _usual_parts(self) -> dict[str, float]:
         """Return how long each stage takes, of hundred runs: the figures are a small part of it."""
@@ -315,18 +308,22 @@ class SensitivityWork:
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers of the analysis."""
-        flows = {name: dataset_hash(flow, ("u", "v")) for name, flow in self.flows.items()}
         return {
             "study": self.study.to_dict(),
             "flow_sha256": dataset_hash(self.flow, ("u", "v")),
-            "flows_sha256": flows,
+            "flows_sha256": {key: dataset_hash(one, ("u", "v")) for key, one in self.flows.items()},
             "sobol_samples": self.samples,
             **table_hash(self.study),
         }
 
     def compute(self, run: Run) -> SensitivityResult:
         """Simulate the reference, the map and, where they are asked for, Sobol' indices."""
-        from driftwalk.assembly import sensitivity_indices, sensitivity_map, sensitivity_reference
+        from driftwalk.assembly import (
+            principal_components,
+            sensitivity_indices,
+            sensitivity_map,
+            sensitivity_reference,
+        )
 
         # A setting costs the same in each stage.
         staged = run.staged_progress({**self.settings, "figures": 0.0})
@@ -345,25 +342,16 @@ class SensitivityWork:
             self.study, self.flow, axes=self.axes, reference=reference, **how("map", "map")
         )
         found = run.keep_result(found)
-        components = _components(found)
-        if components is not None:
-            components = run.keep("components.nc", components)
-        indices = None
+        # There are none where there is one setting or all are alike.
+        with suppress(InputError):
+            run.keep("components.nc", principal_components(found))
         if self.samples is not None:
             indices = sensitivity_indices(
                 self.study, self.flow, samples=self.samples, **how("sobol", "Sobol")
             )
-            indices = run.keep("sobol.nc", indices)
+            run.keep("sobol.nc", indices)
         staged.begin("figures")
         run.draw()
-        return SensitivityResult(reference, found, components, indices)
-
-
-def _components(sensitivity: xr.Dataset) -> xr.Dataset | None:
-    """Return the principal components; None where there is one setting or all are alike."""
-    from driftwalk.assembly import principal_components
-
-    try:
-        return principal_components(sensitivity)
-    except InputError:
-        return None
+        return SensitivityResult(
+            reference, found, run.datasets.get("components.nc"), run.datasets.get("sobol.nc")
+        )

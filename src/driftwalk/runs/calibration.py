@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from driftwalk.conditions import recording_flow
 from driftwalk.core.calibration_stages import CALIBRATION_STAGES
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.progress import ignore_progress
@@ -80,7 +81,6 @@ class CalibrationWork:
         A model that needs no flow has one only if it was given.
         """
         from driftwalk.calibration import check_recording
-        from driftwalk.conditions import recording_flow
 
         if self.posterior:
             self._require_draws()

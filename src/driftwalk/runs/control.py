@@ -63,20 +63,17 @@ class ControlPlanWork:
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers."""
         modes = self.modes
+        numbers = (modes.flow, modes.flow_scale, modes.force_std, modes.drag_coefficient)
+        columns = (column.tolist() for column in numbers)
         return {
             "study": modes.study.to_dict(),
             "flows_sha256": [dataset_hash(one, ("u", "v")) for one in modes.flows],
-            "modes": [
-                [name, *(values[at].tolist() for values in (
-                    modes.flow, modes.flow_scale, modes.force_std, modes.drag_coefficient
-                ))]
-                for at, name in enumerate(modes.name)
-            ],
+            "modes": [list(row) for row in zip(modes.name, *columns, strict=True)],
             "wanted": vars(self.wanted),
             "rounds": self.rounds,
             "worlds": self.worlds,
             "seed": self.seed,
-        }  # fmt: skip
+        }
 
     def compute(self, run: Run) -> xr.Dataset:
         """Plan the policy and keep it."""

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.conditions import estimated_study, recording_flow
 from driftwalk.core.errors import ConfigurationError, FormatError, InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, run_file, state_of
 from driftwalk.core.provenance import read_manifest
+from driftwalk.flow import load_flow
+from driftwalk.model import Study, apply_overrides, parse_study
 from driftwalk.motion import MotionModel, estimated_values
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.verdict import stored_verdict
@@ -24,8 +27,6 @@ from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from driftwalk.model import Study
 
 BLOCK: Final = "block"
 FLOW_FILE: Final = "flow.nc"
@@ -145,8 +146,6 @@ class FoundRun:
         InputError
             When neither the dataset nor the run directory holds one.
         """
-        from driftwalk.model import Study, parse_study
-
         if "study" in self.found.attrs:
             return parse_study(self.found.attrs["study"], source=f"{self.file}: its study")
         stored = self._manifest.get("study")
@@ -177,9 +176,6 @@ class FoundRun:
         InputError
             When the run is about another model.
         """
-        from driftwalk.conditions import estimated_study
-        from driftwalk.model import apply_overrides
-
         if self.model != BLOCK:
             is_best = "model" in self.found.dims
             about = "closest to its recording is" if is_best else "is about"
@@ -204,9 +200,6 @@ class FoundRun:
         InputError
             When the run does not hold it.
         """
-        from driftwalk.conditions import recording_flow
-        from driftwalk.flow import load_flow
-
         held = flow_of_result(self.found)
         if held is not None:
             return held

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 from driftwalk.core.errors import InputError
 from driftwalk.core.progress import ignore_progress
 from driftwalk.runs.finished_run import run_folder
-from driftwalk.runs.resumable_run import dataset_hash
+from driftwalk.runs.resumable_run import FLOW_ERRORS, dataset_hash
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,14 +108,13 @@ class FitWork:
 
         staged = run.staged_progress(self._usual_parts())
         staged.begin("fit")
-        tell = staged.stage("fit")
         found = fit_motion(
             self.recordings,
             self.study,
             body=self.body,
             flow=self.flow,
             earlier=self.earlier,
-            tell=tell,
+            tell=staged.stage("fit"),
         )
         run.keep_result(found)
         run.keep("flow.nc", fitted_flow(found))
@@ -124,11 +123,9 @@ class FitWork:
         self.fitted(found)
         check = None
         if self.compare_laws:
-            tell = staged.stage("laws")
-            found = compare_laws(found, self.recordings, body=self.body, tell=tell)
+            found = compare_laws(found, self.recordings, body=self.body, tell=staged.stage("laws"))
         if self.wall:
-            tell = staged.stage("wall")
-            found = estimate_wall(found, self.recordings, body=self.body, tell=tell)
+            found = estimate_wall(found, self.recordings, body=self.body, tell=staged.stage("wall"))
         if self.check:
             staged.begin("check")
             found, check = judge_fit(found, self.recordings, body=self.body)
@@ -194,8 +191,7 @@ def read_earlier_fit(source: Path | xr.Dataset) -> EarlierFit:
 
 def _hash_of(flow: xr.Dataset) -> str | None:
     """Return the hash of what a fit takes from a measured flow."""
-    errors = tuple(name for name in ("u_standard_error", "v_standard_error") if name in flow)
-    return dataset_hash(flow, ("u", "v", "flag", *errors))
+    return dataset_hash(flow, ("u", "v", "flag"), where_held=FLOW_ERRORS)
 
 
 def figures_of_fit(
@@ -206,17 +202,11 @@ def figures_of_fit(
 ) -> Figures:
     """Return the figures of a fit that a run holds."""
     from driftwalk.figures import fit_figures
-
-    return fit_figures(fit, recording, flows=_flows(fit), body=body, check=check)
-
-
-def _flows(fit: xr.Dataset) -> list[xr.Dataset]:
-    """Return the flows of a fit, one for all of it or one for each name."""
     from driftwalk.likelihood import fitted_flow
 
-    if "flow" not in fit.dims:
-        return [fitted_flow(fit, interval=0)]
-    interval_flow = fit["interval_flow"].values.tolist()
-    return [
-        fitted_flow(fit, interval=interval_flow.index(flow)) for flow in range(fit.sizes["flow"])
-    ]
+    first = [0]
+    if "flow" in fit.dims:
+        interval_flow = fit["interval_flow"].values.tolist()
+        first = [interval_flow.index(flow) for flow in range(fit.sizes["flow"])]
+    flows = [fitted_flow(fit, interval=interval) for interval in first]
+    return fit_figures(fit, recording, flows=flows, body=body, check=check)

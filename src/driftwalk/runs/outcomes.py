@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
+from driftwalk.model import Study
 from driftwalk.runs.assembly import table_hash
 from driftwalk.runs.resumable_run import dataset_hash
 
@@ -15,14 +16,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.assembly.outcome_posterior.records import Outcomes
-    from driftwalk.model import Study
     from driftwalk.runs.resumable_run import Run
 
 
-def _no_study() -> Study:
-    from driftwalk.model import Study
-
-    return Study()
+HISTORY: Final = ("outcome", "event_time", "event_class", "end_time", "split_time", "split_class")
+"""Variables that say what happened to blocks, of a simulation or of a recording."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class KineticsWork:
     blocks: int | None = None
     seed: int = 1
     inputs: Mapping[str, Path] = field(default_factory=dict)
-    study: Study = field(default_factory=_no_study)
+    study: Study = field(default_factory=Study)
 
     kind: ClassVar = "kinetics"
 
@@ -69,7 +67,9 @@ class KineticsWork:
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers."""
         return {
-            "histories_sha256": [[_hash(one) for one in found] for found in self.sets],
+            "histories_sha256": [
+                [dataset_hash(one, (), where_held=HISTORY) for one in found] for found in self.sets
+            ],
             "target": self.target,
             "blocks": self.blocks,
             "seed": self.seed,
@@ -89,11 +89,6 @@ class KineticsWork:
             progress=lambda done, total: run.progress(done, total, "models"),
         )
         return run.keep_result(found)
-
-
-def _hash(found: xr.Dataset) -> str | None:
-    names = ("outcome", "event_time", "event_class", "end_time", "split_time", "split_class")
-    return dataset_hash(found, tuple(name for name in names if name in found))
 
 
 @dataclass(frozen=True)

@@ -61,20 +61,19 @@ class RecoveryWork:
         """Return what determines the numbers of the study."""
         from driftwalk.calibration import ModelRecovery
 
-        method, flow = self.method, self.method.flow
+        method = self.method
         said: dict[str, Any] = {
             "study": self.study.to_dict(),
-            "flow_sha256": dataset_hash(flow, ("u", "v")),
+            "flow_sha256": dataset_hash(method.flow, ("u", "v")),
         }
         if not isinstance(method, ModelRecovery):
             return said
-        like = method.like
         return said | {
             "model": method.model.describe(),
             "truth": dict(method.truth),
             "body": method.body,
             "noise": method.noise,
-            "like_sha256": dataset_hash(like, ("x", "y", "theta")),
+            "like_sha256": dataset_hash(method.like, ("x", "y", "theta")),
         }
 
     def compute(self, run: Run) -> xr.Dataset:

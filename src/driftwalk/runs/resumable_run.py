@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Final, Protocol, Self
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.progress import StagedProgress, ignore_progress
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from driftwalk.sweep import Store
 
 
+FLOW_ERRORS: Final = ("u_standard_error", "v_standard_error")
+"""Variables of a flow field that was measured with its errors."""
+
+
 class Progress(Protocol):
     """Takes note of how much of a run is done."""
 
-    def __call__(self, done: int, total: int, text: str = "") -> None:
+    def __call__(self, done: int, total: int, text: str = "", /) -> None:
         """Take note that `done` of `total` parts are complete, and what is under way."""
-
-
-def silent(done: int, total: int, text: str = "") -> None:
-    """Report no progress."""
 
 
 class Work(Protocol):
@@ -88,7 +88,7 @@ class Run(RunContents):
 
     directory: RunDirectory
     kind: str
-    progress: Progress = silent
+    progress: Progress = ignore_progress
     executor: Executor | None = None
     drawn: bool = False
     warnings: Sequence[str] = ()
@@ -135,7 +135,7 @@ def run_work(
     overwrite: bool = False,
     begun: Callable[[], None] = ignore_progress,
     executor: Executor | None = None,
-    progress: Progress = silent,
+    progress: Progress = ignore_progress,
     command: str | Sequence[str] = "driftwalk.runs.run_work(...)",
     warnings: Sequence[str] = (),
 ) -> Any:
@@ -233,12 +233,18 @@ def naming_recording(inputs: Mapping[str, Path]) -> Iterator[None]:
         raise InputError(f"{inputs['recording']}: {error}") from error
 
 
-def dataset_hash(dataset: xr.Dataset | None, names: tuple[str, ...]) -> str | None:
-    """Return a hash of the coordinates and the named variables of a dataset, None without one."""
+def dataset_hash(
+    dataset: xr.Dataset | None, names: tuple[str, ...], *, where_held: tuple[str, ...] = ()
+) -> str | None:
+    """Return a hash of the coordinates and the named variables of a dataset, None without one.
+
+    A variable of `where_held` is hashed where the dataset has it.
+    """
     if dataset is None:
         return None
     digest = hashlib.sha256()
-    for name in (*sorted(str(name) for name in dataset.indexes), *names):
+    held = [name for name in where_held if name in dataset]
+    for name in (*sorted(map(str, dataset.indexes)), *names, *held):
         values = dataset[name].values
         digest.update(
             repr(values.tolist()).encode() if values.dtype == object else values.tobytes()

@@ -26,10 +26,8 @@ REQUEST_S: Final = 10.0
 bytes: a phone on a bad line needs a second or two. A client that sends half of it and waits would
 otherwise hold an open file of the server without end; chosen by hand."""
 
-Failed = Callable[[BaseException], None]
 
-
-def make_app(source: Source, gate: Gate, *, failed: Failed) -> ASGIApp:
+def make_app(source: Source, gate: Gate, *, failed: Callable[[BaseException], None]) -> ASGIApp:
     """Return the application of a server.
 
     Parameters

@@ -14,6 +14,7 @@ import math
 import time as clock
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Final
 
 from driftwalk.core.errors import InputError
@@ -79,7 +80,8 @@ class SoundFrames:
         faults = {name: fault for name, fault in found.items() if fault is not None}
         self._note("value", [f"{name} {fault}" for name, fault in faults.items()])
         sound = {**content, **dict.fromkeys(faults), "bodies": self._bodies(content["bodies"])}
-        for kind, name, check in (("join", "joined", _join), ("event", "events", _event)):
+        event = partial(_first_fault, checks=EVENT)
+        for kind, name, check in (("join", "joined", _join), ("event", "events", event)):
             if isinstance(sound.get(name), list):
                 sound[name] = self._kept(kind, sound[name], check)
         return sound
@@ -170,16 +172,8 @@ def _number(value: Any) -> Fault:
     return None if finite else "is not a finite number"
 
 
-def _text(value: Any) -> Fault:
-    return None if isinstance(value, str) else "is not text"
-
-
-def _flag(value: Any) -> Fault:
-    return None if isinstance(value, bool) else "is not true or false"
-
-
-def _list(value: Any) -> Fault:
-    return None if isinstance(value, list) else "is not a list"
+def _instance_of(kind: type, words: str) -> Check:
+    return lambda value: None if isinstance(value, kind) else f"is not {words}"
 
 
 def _texts(value: Any) -> Fault:
@@ -202,15 +196,12 @@ def _is_face(value: Any) -> bool:
     return type(value) is int and value in FACES
 
 
-def _event(entry: Any) -> Fault:
-    return _first_fault(entry, EVENT)
-
-
+_text, _list = _instance_of(str, "text"), _instance_of(list, "a list")
 FRAME: Final[dict[str, Check]] = {"frame": _number, "time_s": _number, "bodies": _list}
 """Without these nothing of a frame can be drawn."""
 BODY: Final[dict[str, Check]] = {
     "id": _text,
-    "seen": _flag,
+    "seen": _instance_of(bool, "true or false"),
     "x_m": _or_null(_number),
     "y_m": _or_null(_number),
     "theta_rad": _or_null(_number),

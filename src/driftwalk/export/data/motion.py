@@ -112,16 +112,12 @@ def _of_worlds(file: Path, kind: str, replicate: int | None) -> Iterator[Motion]
             f"{file}: there is no {dimension} {replicate}: it holds {known[0]} to {known[-1]}"
         )
     for number in known if replicate is None else [replicate]:
-        recording = (
-            path_recording(stored, run=number)
-            if dimension == "run"
-            else load(file, replicate=known.index(number))
-        )
-        if dimension == "run":
-            recording["assembly"] = (
-                ("time", "body"),
-                stored["assembly"].sel(run=number).transpose("time", "block").values,
-            )
+        if dimension == "replicate":
+            recording = load(file, replicate=known.index(number))
+        else:
+            recording = path_recording(stored, run=number)
+            joined = stored["assembly"].sel(run=number).transpose("time", "block")
+            recording["assembly"] = (("time", "body"), joined.values)
         yield Motion(f"{dimension}_{number}", recording)
 
 

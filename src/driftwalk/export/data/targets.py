@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-WHOLE: Final = ("movement",)
-"""Formats that keep the attributes of a recording."""
+WHOLE: Final = "movement"
+"""The format that keeps all samples, and the attributes of a recording."""
 
 
 def lost(format: str, motion: Motion) -> list[str]:
@@ -54,10 +54,10 @@ def lost(format: str, motion: Motion) -> list[str]:
     []
     """
     recording = motion.recording
-    found = _lost_in_samples(format, recording)
-    if format not in WHOLE:
-        tank = tank_text(recording)
-        if tank:
+    found: list[str] = []
+    if format != WHOLE:
+        found += _lost_in_samples(format, recording)
+        if tank := tank_text(recording):
             found.append(f"the tank: give `tank={json.dumps(tank)}` when the file is read")
         if "time_origin_unix_s" in recording.attrs and format != "ros":
             began = float(recording.attrs["time_origin_unix_s"])
@@ -95,8 +95,7 @@ def read_again(format: str, motion: Motion, file: Path) -> str:
     names = topics(motion.recording)
     if format == "ros" and len(names) > 1:
         arguments.append(f"topic={json.dumps(','.join(names))}")
-    tank = "" if format in WHOLE else tank_text(motion.recording)
-    if tank:
+    if format != WHOLE and (tank := tank_text(motion.recording)):
         arguments.append(f"tank={json.dumps(tank)}")
     return f"driftwalk.load({', '.join(arguments)})"
 
@@ -165,16 +164,11 @@ def write_tank(motion: Motion, folder: Path) -> list[Path]:
 
 def _lost_in_samples(format: str, recording: xr.Dataset) -> list[str]:
     """Return which samples a table or a bag of those that are there leaves out."""
-    if format in WHOLE:
-        return []
     x, theta = recording["x"].values, recording["theta"].values
     present = np.isfinite(x) & np.isfinite(recording["y"].values)
     found = []
-    absent = [
-        name for name, any_ in zip(body_names(recording), present.any(axis=0), strict=True)
-        if not any_
-    ]  # fmt: skip
-    if absent:
+    absent = np.array(body_names(recording))[~present.any(axis=0)]
+    if absent.size:
         found.append(f"bodies that are never seen: {', '.join(absent)}")
     empty = int((~present.any(axis=1)).sum())
     if empty and format != "csv":
@@ -209,7 +203,6 @@ def _lost_in_bag(recording: xr.Dataset) -> list[str]:
     return found
 
 
-README: Final = "README.md"
 MEANING: Final = {
     "csv": "driftwalk's plain table: t_s, x_m, y_m, theta_rad, body. Metres, seconds, radians; y "
     "is up, angles are counter-clockwise. Every number has the digits that give the same double "
@@ -262,7 +255,7 @@ def write_readme(
             lines += [f"driftwalk reads it again: `{call}`", ""]
         if absent:
             lines += ["The file does not hold:", "", *(f"- {what}" for what in absent), ""]
-    target = folder / README
+    target = folder / "README.md"
     write_atomic(target, "\n".join(lines).encode())
     return target
 
@@ -276,7 +269,7 @@ WRITERS: Final[dict[str, tuple[Callable[[Motion, Path], list[Path]], str]]] = {
 
 
 def _write_motions(format: str, source: Source, folder: Path) -> list[Path]:
-    write = WRITERS[format][0]
+    write, _ = WRITERS[format]
     files: list[Path] = []
     pages: list[tuple[Path, list[str], str]] = []
     missing: dict[str, None] = {}
@@ -286,7 +279,7 @@ def _write_motions(format: str, source: Source, folder: Path) -> list[Path]:
         pages.append((file, sentences, read_again(format, motion, file)))
         files += [file, *further]
         missing |= dict.fromkeys(sentences)
-        if format != "movement":
+        if format != WHOLE:
             files += [one for one in write_tank(motion, folder) if one not in files]
     for sentence in missing:
         source.tell(f"{format} does not hold {sentence}")

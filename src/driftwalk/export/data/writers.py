@@ -92,12 +92,9 @@ def write_trackpy(motion: Motion, folder: Path) -> list[Path]:
     time = recording["time"].values
     frames = frame_numbers(recording)
     particles = particle_numbers(recording)
-    columns = ["y", "x", "frame", "particle", "time_s"]
     oriented = bool(np.isfinite(recording["theta"].values).any())
     with atomic_path(target) as partial, partial.open("w", encoding="utf-8", newline="") as file:
-        header = [*columns, *(["theta_rad"] if oriented else [])]
-        pd.DataFrame(columns=header).to_csv(file, index=False)
-        for first in range(0, time.size, ROWS_AT_ONCE):
+        for first in range(0, max(time.size, 1), ROWS_AT_ONCE):
             block = slice(first, first + ROWS_AT_ONCE)
             x, y, theta = (recording[name].values[block] for name in ("x", "y", "theta"))
             row, body = np.nonzero(np.isfinite(x) & np.isfinite(y))
@@ -110,7 +107,7 @@ def write_trackpy(motion: Motion, folder: Path) -> list[Path]:
             }
             if oriented:
                 values["theta_rad"] = theta[row, body]
-            pd.DataFrame(values).to_csv(file, index=False, header=False)
+            pd.DataFrame(values).to_csv(file, index=False, header=first == 0)
     return [target]
 
 
@@ -266,7 +263,26 @@ def write_ros(motion: Motion, folder: Path) -> list[Path]:
     # Not NAME.bag, which the programs of ROS take for a file of ROS 1.
     target = folder / f"{motion.name}_bag"
     require_free(target, existing="error")
-    _write_bag(motion.recording, target)
+    try:
+        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise InputError("a ROS bag needs rosbags: pip install 'driftwalk[ros]'") from error
+    recording = motion.recording
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    known = {key: str(value) for key, value in recording.attrs.items()}
+    x, y, theta = (recording[name].values for name in ("x", "y", "theta"))
+    with Writer(target, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        writer.set_custom_data("driftwalk", json.dumps(known))
+        connections = [
+            writer.add_connection(topic, POSE_STAMPED, typestore=store)
+            for topic in topics(recording)
+        ]
+        for row, stamp in enumerate(stamps(recording).tolist()):
+            for body in np.flatnonzero(np.isfinite(x[row]) & np.isfinite(y[row])).tolist():
+                pose = (float(x[row, body]), float(y[row, body]), float(theta[row, body]))
+                message = _message(store.types, stamp, *pose)
+                writer.write(connections[body], stamp, store.serialize_cdr(message, POSE_STAMPED))
     return [target]
 
 
@@ -347,28 +363,6 @@ def stamps(recording: xr.Dataset) -> Integers:
     seconds = np.floor(time)
     parts = np.rint((time - seconds + began) * NS_PER_S).astype(np.int64)
     return (seconds.astype(np.int64) + added) * NS_PER_S + parts
-
-
-def _write_bag(recording: xr.Dataset, path: Path) -> None:
-    try:
-        from rosbags.rosbag2 import StoragePlugin, Writer
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise InputError("a ROS bag needs rosbags: pip install 'driftwalk[ros]'") from error
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    known = {key: str(value) for key, value in recording.attrs.items()}
-    x, y, theta = (recording[name].values for name in ("x", "y", "theta"))
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        writer.set_custom_data("driftwalk", json.dumps(known))
-        connections = [
-            writer.add_connection(topic, POSE_STAMPED, typestore=store)
-            for topic in topics(recording)
-        ]
-        for row, stamp in enumerate(stamps(recording).tolist()):
-            for body in np.flatnonzero(np.isfinite(x[row]) & np.isfinite(y[row])).tolist():
-                pose = (float(x[row, body]), float(y[row, body]), float(theta[row, body]))
-                message = _message(store.types, stamp, *pose)
-                writer.write(connections[body], stamp, store.serialize_cdr(message, POSE_STAMPED))
 
 
 def _message(types: dict[str, Any], stamp: int, x: float, y: float, theta: float) -> Any:

@@ -6,26 +6,25 @@ import json
 import os
 import re
 import shutil
-import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.export.simulators.block import Block, read_block
 from driftwalk.export.simulators.parts import (
     Folder,
+    last_line,
+    run_program,
     stored_text,
     wall_pieces,
     words_of,
     write_common,
     write_numbers,
 )
-from driftwalk.export.simulators.reference import NO_PATH, PathSet, forces_of, reference_of
+from driftwalk.export.simulators.reference import NO_PATH, forces_of, reference_of
 from driftwalk.export.target import Source, Verification
 
 
@@ -92,18 +91,14 @@ def model_data(block: Block) -> str:
 def _reference_text(block: Block) -> str:
     """Return forces and paths of driftwalk as numbers for ``verify.c``."""
     forces, reference = forces_of(block), reference_of(block)
-    lines = [str(len(forces)), *(_line(row) for row in forces)]
+    lines = [str(len(forces)), *map(_line, forces)]
     sets = (reference.still, reference.noisy)
     lines.append(str(sum(paths.replicate.size for paths in sets)))
     for noisy, paths in enumerate(sets):
-        for row in range(paths.replicate.size):
-            lines += _path_lines(paths, row, noisy, reference.steps_per_sample)
+        for number, poses in zip(paths.replicate, paths.pose, strict=True):
+            lines.append(f"{noisy} {number} {len(poses)} {reference.steps_per_sample}")
+            lines += map(_line, poses)
     return "\n".join(lines) + "\n"
-
-
-def _path_lines(paths: PathSet, row: int, noisy: int, steps: int) -> list[str]:
-    poses = np.stack([paths.x[row], paths.y[row], paths.theta[row]], axis=1)
-    return [f"{noisy} {paths.replicate[row]} {len(poses)} {steps}", *(_line(one) for one in poses)]
 
 
 def _line(numbers: Floats) -> str:
@@ -157,12 +152,12 @@ def verify_force(folder: Path, sources: str) -> Verification:
         places = [folder / sources / file for file in ("floating_block.c", "model_data.c")]
         command = [found, "-std=c99", "-O2", f"-I{folder / sources}"]
         command += [str(path) for path in (folder / "verify" / "verify.c", *places)]
-        built = _run([*command, "-o", str(program), "-lm"])
+        built = run_program([*command, "-o", str(program), "-lm"])
         if built.returncode != 0:
-            raise InputError(f"{found} does not compile {places[0]}: {_last(built.stderr)}")
-        done = _run([str(program), str(folder / "verify" / "reference.txt")])
+            raise InputError(f"{found} does not compile {places[0]}: {last_line(built.stderr)}")
+        done = run_program([str(program), str(folder / "verify" / "reference.txt")])
     if done.returncode not in (0, 1):
-        raise InputError(f"the proof of {folder} failed: {_last(done.stderr)}")
+        raise InputError(f"the proof of {folder} failed: {last_line(done.stderr)}")
     numbers = json.loads(done.stdout)
     lines = (
         f"{numbers['forces']} forces of the compiled code: relative error at most "
@@ -173,11 +168,3 @@ def verify_force(folder: Path, sources: str) -> Verification:
         else NO_PATH,
     )
     return Verification(done.returncode == 0 and numbers["paths"] > 0, lines, numbers)
-
-
-def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
-def _last(text: str) -> str:
-    return (text.strip().splitlines() or ["no output"])[-1]

@@ -6,7 +6,6 @@ import importlib.util
 import io
 import json
 import math
-import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,6 +17,8 @@ from driftwalk.core.errors import InputError
 from driftwalk.export.simulators.block import Block, read_block
 from driftwalk.export.simulators.parts import (
     Folder,
+    last_line,
+    run_program,
     start_pose,
     wall_pieces,
     words_of,
@@ -133,16 +134,10 @@ def require() -> None:
 
 def verify(folder: Path) -> Verification:
     """Run ``verify.py`` of an export in a separate process; see `Target.verify`."""
-    done = subprocess.run(
-        [sys.executable, "-B", "-c", "import json, verify; print(json.dumps(verify.prove()))"],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    program = "import json, verify; print(json.dumps(verify.prove()))"
+    done = run_program([sys.executable, "-B", "-c", program], folder)
     if done.returncode != 0:
-        last = (done.stderr.strip().splitlines() or ["no output"])[-1]
-        raise InputError(f"{folder / 'verify.py'} failed: {last}")
+        raise InputError(f"{folder / 'verify.py'} failed: {last_line(done.stderr)}")
     found = json.loads(done.stdout)
     numbers: dict[str, float | int] = {}
     lines = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
 from dataclasses import dataclass
 from importlib.metadata import distribution
 from importlib.resources import files
@@ -146,3 +147,13 @@ def start_pose(block: Block, replicate: int = 0) -> tuple[float, float, float]:
     drawn = random_start(block.study, world_keys(block.seed, trial=0, replicate=[replicate]))
     x, y, theta = (float(np.asarray(value)[0]) for value in (drawn.x, drawn.y, drawn.theta))
     return x, y, theta
+
+
+def run_program(command: list[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a program that proves an export, and return what it said."""
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def last_line(text: str) -> str:
+    """Return the last line of what a program said."""
+    return (text.strip().splitlines() or ["no output"])[-1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -26,14 +26,11 @@ chosen by hand."""
 NO_PATH: Final = "no path stays clear of the wall of this tank for a second: nothing was compared"
 
 
-@dataclass(frozen=True)
-class PathSet:
-    """Some paths: which replicates they are, and their poses, shape (paths, samples)."""
+class PathSet(NamedTuple):
+    """Some paths: which replicates they are, and x, y and theta, shape (paths, samples, 3)."""
 
     replicate: Integers
-    x: Floats
-    y: Floats
-    theta: Floats
+    pose: Floats
 
 
 @dataclass(frozen=True)
@@ -59,12 +56,9 @@ class Reference:
         """Return everything as arrays, units in the names."""
         found: dict[str, Any] = {"time_s": self.time}
         for name, paths in (("still", self.still), ("noisy", self.noisy)):
-            found |= {
-                f"{name}_replicate": paths.replicate,
-                f"{name}_x_m": paths.x,
-                f"{name}_y_m": paths.y,
-                f"{name}_theta_rad": paths.theta,
-            }
+            found[f"{name}_replicate"] = paths.replicate
+            for place, key in enumerate(("x_m", "y_m", "theta_rad")):
+                found[f"{name}_{key}"] = paths.pose[..., place]
         return found
 
 
@@ -105,8 +99,7 @@ def _clear_paths(study: Study, block: Block, time: Floats) -> PathSet:
     try:
         start = random_start(study, keys)
     except InputError:  # the block hardly fits into the tank
-        none = np.zeros((0, time.size))
-        return PathSet(np.zeros(0, dtype=np.int64), none, none, none)
+        return PathSet(np.zeros(0, dtype=np.int64), np.zeros((0, time.size, 3)))
     run = simulate(
         study,
         block.flow,
@@ -116,9 +109,10 @@ def _clear_paths(study: Study, block: Block, time: Floats) -> PathSet:
         seed=block.seed,
         backend="reference",
     )
-    x, y, theta = (run[name].values[:, :, 0].astype(np.float64) for name in ("x", "y", "theta"))
-    kept = np.flatnonzero(_is_clear(study, x, y))[:KEPT]
-    return PathSet(kept, x[kept], y[kept], theta[kept])
+    pose = np.stack([run[name].values[:, :, 0] for name in ("x", "y", "theta")], axis=2)
+    pose = pose.astype(np.float64)
+    kept = np.flatnonzero(_is_clear(study, pose[..., 0], pose[..., 1]))[:KEPT]
+    return PathSet(kept, pose[kept])
 
 
 def _is_clear(study: Study, x: Floats, y: Floats) -> Bools:

@@ -157,7 +157,6 @@ def survival_section(times: xr.Dataset) -> Section:
     time = times["time"].values
     drawn = [parts.course(words, time, times, name) for name, words in SURVIVAL.items()]
     return parts.chart(
-        "survival", "Time to contact and completion",
         x=parts.label("time", "s"), y=parts.label("share of runs"), series=drawn,
         marks=[parts.mark("half of the runs", y=0.5)],
     )  # fmt: skip
@@ -175,7 +174,7 @@ def attraction_section(attraction: xr.Dataset) -> Section:
         )
     ]
     return parts.chart(
-        "attraction", "Force between two blocks", f"{attraction_words(attraction)}.",
+        f"{attraction_words(attraction)}.",
         x=parts.label("gap between the faces", "m"), y=parts.label("attraction", "N", log=True),
         series=drawn,
     )  # fmt: skip
@@ -192,7 +191,7 @@ def drawn_section(assembly: xr.Dataset) -> Section:
     if "flow" in what:
         note += " Each also has its own flow, drawn within the errors of the field."
     return parts.chart(
-        "drawn", "The drawn parameters", note,
+        note,
         x=parts.label(f"stochastic force σ_F{redrawn}", "N"), y=parts.label("drag coefficient C_d"),
         series=[parts.series("runs", force, drag, style="points")],
     )  # fmt: skip
@@ -236,12 +235,11 @@ def l1_and_chance(first: xr.Dataset, second: xr.Dataset) -> tuple[float, float]:
     common value gives.
     """
     runs = [float(required(one, "runs")) for one in (first, second)]
-    shares: list[dict[str, float]] = [
-        dict(zip(class_names(one), one["proportion"].values.tolist(), strict=True))
-        for one in (first, second)
-    ]
-    names = list(dict.fromkeys([*shares[0], *shares[1]]))
-    one, other = (np.array([share.get(name, 0.0) for name in names]) for share in shares)
+    names = list(dict.fromkeys([*class_names(first), *class_names(second)]))
+    one, other = (
+        found["proportion"].reindex({"class": names}, fill_value=0.0).values
+        for found in (first, second)
+    )
     common = (runs[0] * one + runs[1] * other) / sum(runs)
     spread = np.sqrt(common * (1.0 - common) * sum(1.0 / number for number in runs))
     return float(np.abs(one - other).sum()), float(np.sqrt(2.0 / np.pi) * spread.sum())
@@ -310,12 +308,12 @@ def steady_sections(steady: xr.Dataset) -> list[Section]:
             name = short_class(str(one["class"].values))
             drawn.append(parts.course(name, steady["age"].values, one, "survival"))
     return [
-        parts.section_of_table("steady-state", "Steady state", table, note),
+        parts.section_of_table(table, note),
         parts.chart(
-            "lifetimes", "Lifetimes of the classes",
             "Kaplan-Meier, censored at the end of a run; a stay ends with a joining or a parting.",
             x=parts.label("time since the class formed", "s"),
             y=parts.label("share that lasts longer"), series=drawn,
             marks=[parts.mark("half of the stays", y=0.5)],
+            id="lifetimes", title="Lifetimes of the classes",
         ),
     ]  # fmt: skip

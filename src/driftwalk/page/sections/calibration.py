@@ -9,17 +9,7 @@ import numpy as np
 
 from driftwalk.page import parts
 from driftwalk.page.arrays import number
-from driftwalk.page.parts import (
-    Maker,
-    Section,
-    count,
-    is_simulated,
-    quantity,
-    require,
-    required,
-    value_of,
-    with_interval,
-)
+from driftwalk.page.parts import Maker, Section, count, quantity, require, required, value_of
 from driftwalk.page.sections.flow import flow_sections
 from driftwalk.page.sections.map import (
     FORCE,
@@ -79,14 +69,12 @@ def calibration_sections(
         made += recording_sections(recording, body=body, noise=noise)
     if flow is not None:
         made += flow_sections(flow)
-    if calibration is None:
-        return made
     pieces: list[tuple[str, str, Maker]] = [
         ("profiles", "Along the optimum", profile_sections),
         ("bootstrap", "The bootstrap", bootstrap_section),
         ("validation", "Validation", validation_section),
     ]
-    if len(page_parameters(calibration)) != 1:
+    if calibration is not None and len(page_parameters(calibration)) != 1:
         one = one_body(recording, body)
         pieces.insert(0, ("map", "The map", lambda found: map_section(found, one)))
     return made + parts.attempts(*((*piece, calibration) for piece in pieces))
@@ -95,7 +83,7 @@ def calibration_sections(
 def calibration_summary(calibration: xr.Dataset) -> Section:
     """Return the answer of a calibration in words and numbers."""
     require(calibration, "ks_distance")
-    paragraphs = [parts.SIMULATED] if is_simulated(calibration) else []
+    paragraphs = [parts.SIMULATED] if parts.is_simulated(calibration) else []
     paragraphs += [_what_was_done(calibration), _what_was_found(calibration)]
     shown = [
         *_estimates(calibration),
@@ -181,7 +169,7 @@ def bootstrap_section(calibration: xr.Dataset) -> Section:
         if region is not None:
             drawn.append(parts.series("joint region", *([*region[n], region[n][0]] for n in "xy")))
     x = axis_of(calibration, parameters[0])
-    return parts.chart("bootstrap", title, note, x=x, y=y, series=drawn, marks=marks)
+    return parts.chart(note, x=x, y=y, series=drawn, marks=marks, title=title)
 
 
 def validation_section(calibration: xr.Dataset) -> Section:
@@ -204,7 +192,7 @@ def validation_section(calibration: xr.Dataset) -> Section:
         [label, None if (value := value_of(calibration, key)) is None else scale * value]
         for label, key, scale in keys
     ]
-    return parts.table_section("validation", title, ["", "value"], rows)
+    return parts.table_section(["", "value"], rows, title=title)
 
 
 def _with_unit(one: Number) -> str:
@@ -245,7 +233,7 @@ def _what_was_found(calibration: xr.Dataset) -> str:
     confidence = value_of(calibration, "confidence")
     parameters = page_parameters(calibration)
     found = [
-        with_interval(
+        parts.with_interval(
             required(calibration, one.key),
             interval_of(calibration, f"{one.key}_interval"),
             one.unit,
@@ -284,14 +272,13 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
     second, second_floor = (
         value_of(calibration, f"second_half_{name}") for name in ("ks_distance", "noise_floor")
     )
-    if second is None or second_floor is None:
-        return words
-    return [
-        *words,
-        f"Calibrated on the first half, it is {second:.4g} from the second (noise floor "
-        f"{second_floor:.4g}). This includes the errors of the parameters and the "
-        "flow of half a recording, so a few floors are normal for a short recording.",
-    ]
+    if second is not None and second_floor is not None:
+        words.append(
+            f"Calibrated on the first half, it is {second:.4g} from the second (noise floor "
+            f"{second_floor:.4g}). This includes the errors of the parameters and the "
+            "flow of half a recording, so a few floors are normal for a short recording."
+        )
+    return words
 
 
 def _profile(calibration: xr.Dataset, along: Number) -> Section:
@@ -299,29 +286,24 @@ def _profile(calibration: xr.Dataset, along: Number) -> Section:
     best = {other.name: float(required(calibration, other.key)) for other in others}
     line = calibration.sel(best, method="nearest")
     fixed = [f"{other.short} = {quantity(float(line[other.name]), other.unit)}" for other in others]
-    marks = [
-        parts.mark(
-            "optimum", value_of(calibration, along.key), value_of(calibration, "ks_distance")
-        )
-    ]
+    optimum = (value_of(calibration, key) for key in (along.key, "ks_distance"))
+    marks = [parts.mark("optimum", *optimum)]
     floor = value_of(calibration, "noise_floor")
     if floor is not None:
         marks.append(parts.mark("noise floor", y=floor))
     where = "At " + ", ".join(fixed) + ", the setting of the map next to the optimum."
     drawn = _profile_series(line, along.name)
     if not others and "refined_surface" in calibration:
-        fine = calibration["refined_surface"]
-        drawn.append(
-            parts.series("fitted curve", calibration[f"refined_{along.name}"].values, fine)
-        )
+        fine = (calibration[name].values for name in (f"refined_{along.name}", "refined_surface"))
+        drawn.append(parts.series("fitted curve", *fine))
     return parts.chart(
-        f"profile-{along.name.replace('_', '-')}",
-        f"Distance along the {along.plain}",
         where if fixed else "Every setting that was simulated.",
         x=axis_of(calibration, along),
         y=parts.label("KS distance D", log=True),
         series=drawn,
         marks=marks,
+        id=f"profile-{along.name.replace('_', '-')}",
+        title=f"Distance along the {along.plain}",
     )
 
 
@@ -341,9 +323,7 @@ def _profile_series(line: xr.Dataset, along: str) -> list[dict[str, Any]]:
 
 
 def _noise(calibration: xr.Dataset) -> Noise | None:
-    if "position_noise" not in calibration:
-        return None
-    value = number(float(calibration["position_noise"]))
+    value = number(calibration.get("position_noise"))
     return None if value is None else Noise(value, None, None, "used in the simulated camera")
 
 

@@ -60,11 +60,7 @@ def check_sections(check: xr.Dataset) -> list[Section]:
         ("check-step-length", "Step lengths, recorded and predicted", lengths),
         ("check-turning-angle", "Turning angles, recorded and predicted", angles),
     )
-    made: list[Section] = []
-    for id, title, make in makers:
-        pieces = parts.attempt(id, title, partial(make, check))
-        made += [{**part, "id": id, "title": title} for part in pieces]
-    return made
+    return parts.attempts(*((*piece, check) for piece in makers))
 
 
 def _criteria(check: xr.Dataset) -> Section:
@@ -84,7 +80,7 @@ def _criteria(check: xr.Dataset) -> Section:
     if any(row[0].endswith(": small") for row in rows):
         note += " Where it says 'small', the misfit is too small to change the verdict."
     heads = ["test", "what it looks for", "p value", "found nine times in ten"]
-    return parts.table_section("", "", heads, rows, note)
+    return parts.table_section(heads, rows, note)
 
 
 def _innovations(check: xr.Dataset) -> Section:
@@ -100,7 +96,7 @@ def _innovations(check: xr.Dataset) -> Section:
         shown = "θ" if name == "theta" else name
         drawn.append(parts.series(f"error in {shown}", lag, values, style="points"))
     return parts.chart(
-        "", "", "Errors of a right model have no memory.",
+        "Errors of a right model have no memory.",
         x=parts.label("lag (samples)"), y=parts.label("autocorrelation"), series=drawn,
     )  # fmt: skip
 
@@ -119,7 +115,7 @@ def _mean_errors(check: xr.Dataset) -> Section:
     )
     return _field(
         check, distance, f"Distance of the mean error from zero.{beyond}",
-        words="distance from zero (standard deviations)", diverging=False, limits=[0.0, top],
+        words="distance from zero (standard deviations)", limits=[0.0, top],
     )  # fmt: skip
 
 
@@ -129,25 +125,19 @@ def _noise_ratio(check: xr.Dataset) -> Section:
     top = max(LEAST_TOP, float(np.nanmax(np.abs(off), initial=0.0)))
     return _field(
         check, off, "Mean squared error of each cell, relative to all cells.",
-        words="off the mean (standard deviations)", diverging=True, limits=[-top, top],
+        words="off the mean (standard deviations)", limits=[-top, top],
     )  # fmt: skip
 
 
 def _field(
-    check: xr.Dataset,
-    values: Floats,
-    note: str,
-    *,
-    words: str,
-    diverging: bool,
-    limits: list[float],
+    check: xr.Dataset, values: Floats, note: str, *, words: str, limits: list[float]
 ) -> Section:
     return parts.section(
         "", "image_grid", "", note,
         arena=parts.arena_part(check),
         x=parts.axis("x", "x", "m", check["x"].values),
         y=parts.axis("y", "y", "m", check["y"].values),
-        value=encode_array(values), label=words, unit="1", diverging=diverging, limits=limits,
+        value=encode_array(values), label=words, unit="1", diverging=limits[0] < 0.0, limits=limits,
     )  # fmt: skip
 
 
@@ -165,7 +155,7 @@ def _over_time(check: xr.Dataset, *, show: str) -> Section:
     if show == "flow" and np.isnan(value).any():
         note += f" {ABSORBED}"
     return parts.chart(
-        "", "", note,
+        note,
         x=parts.label("time", "s"), y=parts.label(words),
         series=[_with_bars("tenths", 0.5 * (start + end), value, reach)],
         marks=[parts.mark("no change", y=0.0)],
@@ -182,7 +172,7 @@ def _drag_by_speed(check: xr.Dataset) -> Section:
     reach = BAND_STDS * check["drag_change_std"].values
     middle = 0.5 * (check["speed_low"].values + check["speed_high"].values)
     return parts.chart(
-        "", "", "A right drag law has the same C_d at all speeds; 95 % bars.",
+        "A right drag law has the same C_d at all speeds; 95 % bars.",
         x=parts.label("speed through the water", "m/s"),
         y=parts.label("C_d, relative to the overall value"),
         series=[_with_bars("ranges of speed", middle, value, reach)],
@@ -201,7 +191,6 @@ def _density(check: xr.Dataset, *, name: str, unit: str) -> Section:
     band = value_of(check, "band")
     share = "" if band is None else f" and band of {percent(band)}"
     return parts.chart(
-        "", "", None,
         x=parts.label(name.replace("_", " "), unit), y=parts.label("density", f"1/{unit}"),
         series=[
             parts.series(f"simulated: median{share}", edge, median, ends=(low, high), style="step"),

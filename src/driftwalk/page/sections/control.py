@@ -42,7 +42,7 @@ def policy_sections(*, policy: xr.Dataset | None = None) -> list[Section]:
     """
     pieces: list[tuple[str, str, Maker]] = [
         ("rounds", "Rounds of planning", rounds_section),
-        ("policy", "Modes chosen", action_sections),
+        ("policy", "Modes chosen", action_section),
         parts.table_part("modes", "Modes alone", mode_table),
     ]
     return parts.sections_of(
@@ -75,10 +75,10 @@ def rounds_section(policy: xr.Dataset) -> Section:
     target = short_class(str(required(policy, "target")))
     columns = ["round", f"share of worlds in {target}", "value iteration (first two rounds)"]
     note = "Value iteration expects too much; only what was reached counts."
-    return parts.table_section("rounds", "Rounds of planning", columns, rows, note)
+    return parts.table_section(columns, rows, note)
 
 
-def action_sections(policy: xr.Dataset) -> list[Section]:
+def action_section(policy: xr.Dataset) -> Section:
     """Return the modes that are chosen with all the time left, by class and time in it."""
     require(policy, "action", "phase", "age")
     names = [str(name) for name in policy["mode"].values]
@@ -89,7 +89,7 @@ def action_sections(policy: xr.Dataset) -> list[Section]:
     ]
     columns = ["class", *(f"after {age:g} s" for age in policy["age"].values)]
     note = f"With {policy['phase'].values[-1]:g} s left or more."
-    return [parts.table_section("policy", "Modes chosen", columns, rows, note)]
+    return parts.table_section(columns, rows, note)
 
 
 def trial_sections(
@@ -160,7 +160,7 @@ def share_section(test: xr.Dataset) -> Section:
         drawn.append(parts.series(str(name), time, share, ends=ends))
     target = short_class(str(required(test, "target")))
     return parts.chart(
-        "share", "Target over time", f"Bands: {in_percent(facts['confidence'])} intervals.",
+        f"Bands: {in_percent(facts['confidence'])} intervals.",
         x=parts.label("time", "s"), y=parts.label(f"share of worlds in {target}"), series=drawn,
     )  # fmt: skip
 
@@ -175,4 +175,4 @@ def film_section(test: xr.Dataset) -> Section:
             continue
         mode = "" if modes[at] < 0 else str(test["mode"].values[modes[at]])
         rows.append([f"{time:g}", short_class(str(test["class"].values[classes[at]])), mode])
-    return parts.table_section("film", "One run", ["time (s)", "class", "mode from then on"], rows)
+    return parts.table_section(["time (s)", "class", "mode from then on"], rows)

@@ -27,7 +27,7 @@ from driftwalk.schema.answers.force_law import (
     shared_lengths,
     wall_estimates,
 )
-from driftwalk.schema.answers.parts import NOT_DETERMINED, Estimate, estimates
+from driftwalk.schema.answers.parts import NOT_DETERMINED, estimates
 from driftwalk.schema.answers.verdict import stored_verdict
 
 if TYPE_CHECKING:
@@ -115,15 +115,10 @@ def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
     paragraphs += [_what_was_done(fit), *_verdict(fit, check), _how_far_they_hold(fit)]
     error = value_of(fit, "chi_squared_per_dof")
     # The answer first, then what only some readers need.
-    found = sorted(map(_number, model_estimates(fit)), key=lambda pair: pair[0])
+    place = {name: at for at, name in enumerate(_ANSWER)}
+    found = sorted(model_estimates(fit), key=lambda one: place.get(one.number.name, len(_ANSWER)))
     shown = parts.figure("mean squared error of prediction", error, note="1 if the model is right")
-    return parts.summary_section(paragraphs, [*(one for _, one in found), shown])
-
-
-def _number(one: Estimate) -> tuple[int, dict[str, Any]]:
-    """Return the place of an estimate among the numbers, and its card."""
-    name = one.number.name
-    return (_ANSWER.index(name) if name in _ANSWER else len(_ANSWER)), parts.card(one)
+    return parts.summary_section(paragraphs, [*map(parts.card, found), shown])
 
 
 def _what_was_done(fit: xr.Dataset) -> str:
@@ -169,15 +164,13 @@ def _how_far_they_hold(fit: xr.Dataset) -> str:
     ]
     facts = facts_of(fit)
     reach = facts.get("drag_coefficient_any_added_mass_interval")
-    if reach is None or linear or not isfinite(reach[1]):
-        return " ".join([*said, "The intervals hold if the force law is right."])
-    return " ".join(
-        [
-            *said,
-            "The intervals hold if the force law is right, and for a block without added mass: "
-            f"with the usual one C_d is between {reach[0]:.3g} and {reach[1]:.3g}.",
-        ]
-    )
+    words = "The intervals hold if the force law is right"
+    if reach is not None and not linear and isfinite(reach[1]):
+        words += (
+            ", and for a block without added mass: with the usual one C_d is between "
+            f"{reach[0]:.3g} and {reach[1]:.3g}"
+        )
+    return " ".join([*said, f"{words}."])
 
 
 def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
@@ -221,21 +214,16 @@ def law_sections(fit: xr.Dataset) -> list[Section]:
             note = "difference of the logarithms of the evidence; below 3 the recording cannot tell"
             apart = facts["law_settled_by"]
             shown.insert(0, parts.figure("evidence for this law over the other", apart, note=note))
-        made.append(
-            parts.summary_section(
-                [*said, *law_limits(facts)], shown, id="law", title="The force law"
-            )
-        )
+        said += law_limits(facts)
+        made.append(parts.summary_section(said, shown, id="law", title="The force law"))
     made += [part for part in (_shared(fit), _compared(fit), _tested(fit)) if part is not None]
     lacking, walls = fit.attrs.get("wall_left_out"), wall_estimates(fit)
     if lacking is not None or walls:
-        words = f"The block touched the wall in {facts['wall_contacts']} passages."
-        paragraphs = [words if lacking is None else f"The wall: {lacking}."]
-        made.append(
-            parts.summary_section(
-                paragraphs, [*map(parts.card, walls)], id="wall", title="The wall"
-            )
-        )
+        words = f"The wall: {lacking}."
+        if lacking is None:
+            words = f"The block touched the wall in {facts['wall_contacts']} passages."
+        cards = [*map(parts.card, walls)]
+        made.append(parts.summary_section([words], cards, id="wall", title="The wall"))
     return made
 
 
@@ -250,8 +238,6 @@ def _shared(fit: xr.Dataset) -> Section | None:
     )
     low_end, high_end = fit["force_correlation_interval"].values.T
     return parts.chart(
-        "stirring",
-        "Shared stirring",
         "Correlation of the stochastic forces on two bodies against their distance: measured, and "
         "the fitted exp(-r²/2L²) with the band of its interval.",
         x=parts.label("distance of the bodies", "m"),
@@ -263,6 +249,8 @@ def _shared(fit: xr.Dataset) -> Section | None:
                 ends=(low_end, high_end), style="points",
             ),
         ],
+        id="stirring",
+        title="Shared stirring",
     )  # fmt: skip
 
 
@@ -280,7 +268,7 @@ def _compared(fit: xr.Dataset) -> Section | None:
         "Each law was fitted to the first 70 % of the recording and predicted the rest. Loss and "
         "evidence are logarithms, against the best law. A dash: the law has no solution."
     )
-    return parts.table_section("laws", "Force laws compared", columns, rows, note)
+    return parts.table_section(columns, rows, note, id="laws", title="Force laws compared")
 
 
 def _tested(fit: xr.Dataset) -> Section | None:
@@ -305,16 +293,14 @@ def _tested(fit: xr.Dataset) -> Section | None:
         "check of the model says whether anything is missing from it."
     )
     columns = ["what was tested", "standard deviations from the model", "why it is not in the fit"]
-    return parts.table_section("tested", "Tested, and not in the fit", columns, rows, note)
+    title = "Tested, and not in the fit"
+    return parts.table_section(columns, rows, note, id="tested", title=title)
 
 
 def _why(name: str, sigmas: float) -> str:
     """Return why a number that was tested is not in the fit."""
-    least = (
-        FORWARD_SELECTION.memory_sigmas
-        if name == "force_memory"
-        else FORWARD_SELECTION.opened_sigmas
-    )
+    policy = FORWARD_SELECTION
+    least = policy.memory_sigmas if name == "force_memory" else policy.opened_sigmas
     if not isfinite(sigmas):
         return "it has no estimate"
     # Chance exceeds two standard deviations in one test of twenty.

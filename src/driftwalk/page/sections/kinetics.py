@@ -90,11 +90,8 @@ def kinetics_summary(kinetics: xr.Dataset) -> Section:
     if "target" in facts:
         paragraphs.insert(0, f"{target_words(kinetics)}.")
         shown += _target_figures(kinetics)
-    shown += [
-        parts.figure(
-            "KS distance of completion times", value_of(kinetics, "completion_ks"), note=note
-        )
-    ]
+    distance = value_of(kinetics, "completion_ks")
+    shown.append(parts.figure("KS distance of completion times", distance, note=note))
     if "other_blocks_rate_per_s" in facts:
         words = f"first join of {facts['other_blocks']} blocks, extrapolated"
         shown.append(parts.figure(words, value_of(kinetics, "other_blocks_rate_per_s"), "s-1"))
@@ -167,7 +164,9 @@ def rates_sections(kinetics: xr.Dataset) -> list[Section]:
     require(kinetics, "count", "rate", "rate_low", "rate_high")
     tables = (rate_table(kinetics, at) for at in range(kinetics.sizes["source"]))
     return [
-        parts.section_of_table(f"rates-{at}", f"Rates, {one.title}" if one.title else "Rates", one)
+        parts.section_of_table(
+            one, id=f"rates-{at}", title=f"Rates, {one.title}" if one.title else "Rates"
+        )
         for at, one in enumerate(tables, start=1)
     ]
 
@@ -185,4 +184,4 @@ def mixing_section(kinetics: xr.Dataset) -> Section:
         "(0: no memory). The p-values are corrected by Holm's method."
     )
     columns = ["test", "events", "statistic", "from", "to (90 %)", "p", "p, corrected"]
-    return parts.table_section("tests", "Tests of a well-mixed tank", columns, rows, note)
+    return parts.table_section(columns, rows, note)

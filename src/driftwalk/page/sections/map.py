@@ -107,8 +107,7 @@ def plane_of(calibration: xr.Dataset) -> tuple[Number, Number]:
     found = page_parameters(calibration)
     if len(found) != 2:
         raise InputError(f"a map shows two parameters, and the calibration has {len(found)}")
-    across, up = found
-    return up, across
+    return found[1], found[0]
 
 
 def region_part(calibration: xr.Dataset) -> dict[str, Any] | None:
@@ -189,7 +188,9 @@ def _cells(calibration: xr.Dataset) -> dict[str, Any] | None:
     )
     if _has(calibration, "excerpt_x", "excerpt_y", "excerpt_time"):
         x, y = (_plane(calibration, f"excerpt_{name}") for name in "xy")
-        step = _excerpt_step(x, y)
+        extents = [float(np.nanmax(v) - np.nanmin(v)) for v in (x, y) if np.isfinite(v).any()]
+        # The excerpts extend over five thousand steps or more.
+        step = binary_step(max(extents, default=0.0), 5000)
         kept["excerpt_x"] = encode_array(x, step=step)
         kept["excerpt_y"] = encode_array(y, step=step)
         kept["excerpt_time"] = plain_list(calibration["excerpt_time"].values)
@@ -204,12 +205,6 @@ def _cells(calibration: xr.Dataset) -> dict[str, Any] | None:
         if name in calibration:
             kept[name] = encode_array(_typical(calibration, name))
     return kept if any(value is not None for value in kept.values()) else None
-
-
-def _excerpt_step(x: Floats, y: Floats) -> float:
-    extents = [float(np.nanmax(v) - np.nanmin(v)) for v in (x, y) if np.isfinite(v).any()]
-    # The excerpts extend over five thousand steps or more.
-    return binary_step(max(extents, default=0.0), 5000)
 
 
 def _typical(calibration: xr.Dataset, name: str) -> Floats:

@@ -107,7 +107,6 @@ def values_section(found: xr.Dataset) -> Section:
             ]
         )
     return parts.table_section(
-        "values", "Values",
         ["parameter", "value", "interval", "determined", "range", "meaning"], rows,
         "A parameter is determined where its 90 % interval ends within 15 % of its value, unless "
         "the discrepancy is above four times the usual.",
@@ -123,7 +122,6 @@ def draws_section(found: xr.Dataset) -> Section:
         share = np.linspace(0.0, 1.0, values.size)
         drawn.append(parts.series(str(one["parameter"].values), values, share))
     return parts.chart(
-        "draws", "How well they are known",
         "Share of the draws below a value, over the estimate: the steeper, the better known.",
         x=parts.label("value / estimate"), y=parts.label("share of the draws"), series=drawn,
     )  # fmt: skip
@@ -135,7 +133,6 @@ def aspects_section(found: xr.Dataset) -> Section:
     require(found, *names)
     rows = [[_aspect(one), *(number(one[name]) for name in names)] for one in each(found, "aspect")]
     return parts.table_section(
-        "aspects", "Aspects",
         ["aspect", "not seen", "seen", "the recording's own parts", "floor"], rows,
         "KS distance from blocks of time that the answer has not seen, and from those it has.",
     )  # fmt: skip
@@ -150,7 +147,7 @@ def checks_section(found: xr.Dataset) -> Section:
         unit = str(one["check_unit"].values)
         rows.append([_check(one), *(cell(float(one[part]), unit) for part in pieces)])
     columns = ["fact", "recording", "median", "smallest", "largest"]
-    return parts.table_section("checks", "Facts that were not fitted", columns, rows, _CHECKS_NOTE)
+    return parts.table_section(columns, rows, _CHECKS_NOTE)
 
 
 def model_sections(
@@ -217,7 +214,7 @@ def ranking_section(comparison: xr.Dataset) -> Section:
     require(comparison, "score", "score_std", "behind", "behind_std", "held_out_distance")
     table = ranking_table(comparison)
     note = "Distance from blocks of time that no model was fitted to."
-    return parts.section_of_table("ranking", "Ranking", table, note)
+    return parts.section_of_table(table, note)
 
 
 def summaries_section(comparison: xr.Dataset) -> Section:
@@ -237,7 +234,7 @@ def summaries_section(comparison: xr.Dataset) -> Section:
     ]
     columns = ["model", "discrepancy", "of own recordings, median", "95 % below", "less likely by"]
     return parts.table_section(
-        "summaries", "Summaries of the motion", [*columns, "named"], rows,
+        [*columns, "named"], rows,
         "About a hundred numbers of the motion, matched by the closest models. The discrepancy is "
         "compared with the model's own simulated recordings; the evidence, as -2 log above the "
         "likeliest model, has a price for each parameter.",
@@ -262,7 +259,7 @@ def scores_section(comparison: xr.Dataset) -> Section:
         if of.any()
     ]
     return parts.chart(
-        "scores", "Distances", "In the order of the ranking, with standard errors.",
+        "In the order of the ranking, with standard errors.",
         x=parts.label("place in the ranking"), y=parts.label("distance, mean of D / floor"),
         series=drawn, marks=[parts.mark("the recording's own parts", y=own_score(comparison))],
     )  # fmt: skip
@@ -273,7 +270,7 @@ def verdicts_section(comparison: xr.Dataset) -> Section:
     require(comparison, "verdict", "verdict_reason")
     columns = [comparison[name].values for name in ("model", "verdict", "verdict_reason")]
     rows = [list(map(str, row)) for row in zip(*columns, strict=True)]
-    return parts.table_section("verdicts", "Verdicts", ["model", "verdict", "why"], rows)
+    return parts.table_section(["model", "verdict", "why"], rows, title="Verdicts")
 
 
 def compared_aspects(comparison: xr.Dataset) -> Section:
@@ -288,7 +285,7 @@ def compared_aspects(comparison: xr.Dataset) -> Section:
     rows = [[name, *map(number, row)] for name, row in zip(names, distances, strict=True)]
     columns = ["model", *map(_aspect, each(comparison[["floor"]], "aspect"))]
     note = "KS distance from the held-out blocks."
-    return parts.table_section("aspects", "Aspects", columns, rows, note)
+    return parts.table_section(columns, rows, note)
 
 
 def compared_checks(comparison: xr.Dataset) -> Section:
@@ -304,7 +301,7 @@ def compared_checks(comparison: xr.Dataset) -> Section:
             cells.append(f"{middle} ({low} to {high})")
         rows.append([_check(one), *cells])
     columns = ["fact", "recording", *map(str, comparison["model"].values)]
-    return parts.table_section("checks", "Facts that were not fitted", columns, rows, _CHECKS_NOTE)
+    return parts.table_section(columns, rows, _CHECKS_NOTE)
 
 
 def compared_values(comparison: xr.Dataset) -> Section:
@@ -321,7 +318,7 @@ def compared_values(comparison: xr.Dataset) -> Section:
         if np.isfinite(one["estimate"])
     ]
     return parts.table_section(
-        "values", "Values", ["model", "parameter", "value"], rows,
+        ["model", "parameter", "value"], rows,
         "The answer of each search. A model that does not explain the recording has values, too: "
         "they mean little.",
     )  # fmt: skip

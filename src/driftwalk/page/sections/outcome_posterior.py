@@ -93,23 +93,23 @@ def density_sections(posterior: xr.Dataset) -> list[Section]:
     require(posterior, "value", "weight", "low", "high")
     weight = posterior["weight"].values
     made = []
-    for at, one in enumerate(each(posterior, "parameter")):
+    for at, one in enumerate(each(posterior, "parameter"), start=1):
         number = number_of(one)
         ends = (float(one["low"]), float(one["high"]))
+        width = ends[1] - ends[0]
         density, edges = np.histogram(
             one["value"].values, BINS, range=ends, weights=weight, density=True
         )
-        flat = np.full(BINS, 1.0 / (ends[1] - ends[0]))
-        name = number.plain
+        flat = np.full(BINS, 1.0 / width)
         drawn = [
-            parts.series("posterior", edges, density * (ends[1] - ends[0]), style="step"),
-            parts.series("without data", edges, flat * (ends[1] - ends[0]), style="step"),
+            parts.series("posterior", edges, density * width, style="step"),
+            parts.series("without data", edges, flat * width, style="step"),
         ]
         made.append(
             parts.chart(
-                f"posterior-{at + 1}", f"Posterior of {name} {condition(posterior)}".rstrip(),
                 x=parts.label(number.words, number.unit), y=parts.label("density over the prior"),
-                series=drawn,
+                series=drawn, id=f"posterior-{at}",
+                title=f"Posterior of {number.plain} {condition(posterior)}".rstrip(),
             )
         )  # fmt: skip
     return made

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import functools
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.core.arrays import Floats
 from driftwalk.core.units import percent
 from driftwalk.page import parts
 from driftwalk.page.arrays import number, numbers
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@functools.cache
+@cache
 def cells_of(name: str, *, discs: bool = False) -> list[list[float]]:
     """Return the squares in the sketch of a class, see `class_cells`; none of anything else.
 
@@ -41,17 +40,13 @@ def cells_of(name: str, *, discs: bool = False) -> list[list[float]]:
     return [[*cell, 1.0] for cell in found] if discs or are_discs(name) else found
 
 
-def classes_section(
-    found: dict[str, xr.Dataset], *, id: str = "classes", title: str = "Structures built"
-) -> Section:
+def classes_section(found: dict[str, xr.Dataset]) -> Section:
     """Return the shares of the outcome classes, one series next to the other.
 
     Parameters
     ----------
     found : dict of str to xarray.Dataset
         Each an `outcome_distribution`, by what it is of.
-    id, title : str
-        Name of the section in its page, and its heading.
 
     Raises
     ------
@@ -67,7 +62,7 @@ def classes_section(
     confidence = value_of(first, "confidence")
     items = {name: class_items(one, names, shown) for name, one in found.items()}
     return parts.section(
-        id, "classes", title,
+        "", "classes", "",
         None if confidence is None else f"{percent(confidence)} simultaneous intervals.",
         confidence=confidence,
         runs=int(first.attrs.get("runs", 0)),
@@ -95,33 +90,22 @@ def class_times_section(times: xr.Dataset) -> Section:
     names = class_names(thin)
     share = thin["proportion"].transpose("class", "time").values
     shown = classes_to_show(names, share.T)
-    ends = [f"proportion_{end}" for end in ("low", "high")]
-    bands = [thin[end].transpose("class", "time").values if end in thin else None for end in ends]
+    known = {"share": share, "low": None, "high": None}
+    for end in ("low", "high"):
+        if f"proportion_{end}" in thin:
+            known[end] = thin[f"proportion_{end}"].transpose("class", "time").values
     classes = [
-        _class_course(
-            names[i], share[i], *(None if band is None else band[i] for band in bands),
-            discs=are_discs(*names),
-        )
+        {"class": names[i], "cells": cells_of(names[i], discs=are_discs(*names))}
+        | {key: None if one is None else numbers(one[i]) for key, one in known.items()}
         for i in shown
-    ]  # fmt: skip
+    ]
     if len(shown) < len(names):
-        classes.append(_class_course(OTHER, with_rest(share, shown)[-1], None, None))
+        rest = numbers(with_rest(share, shown)[-1])
+        classes.append({"class": OTHER, "cells": [], "share": rest, "low": None, "high": None})
     return parts.section(
         "class-times", "class_times", "Outcome classes over time",
         time=numbers(thin["time"].values), classes=classes,
     )  # fmt: skip
-
-
-def _class_course(
-    name: str, share: Floats, low: Floats | None, high: Floats | None, *, discs: bool = False
-) -> dict[str, Any]:
-    return {
-        "class": name,
-        "cells": cells_of(name, discs=discs),
-        "share": numbers(share),
-        "low": None if low is None else numbers(low),
-        "high": None if high is None else numbers(high),
-    }
 
 
 def class_items(found: xr.Dataset, names: list[str], shown: list[str]) -> list[dict[str, Any]]:
@@ -165,29 +149,31 @@ def size_sections(found: dict[str, xr.Dataset]) -> list[Section]:
     found : dict of str to xarray.Dataset
         Each an `assembly_sizes`, by what it is of.
     """
-    mean, title = {"mean_size": ""}, "Largest assembly and free blocks"
-    ratio = "least perimeter over perimeter"
     shares = {"largest_share": "in the largest assembly", "free_share": "alone"}
-    return [
-        *parts.attempt("sizes", "Sizes of the assemblies", lambda: sizes_section(found)),
-        *_over_time(found, "mean-size", "Mean size over time", "blocks per assembly", mean),
-        *_over_time(found, "size-shares", title, "share of the blocks", shares),
-        *(
-            _over_time(found, "compactness", "Compactness over time", ratio, {"compactness": ""})
-            if all("compactness" in one for one in found.values())
-            else []  # older files have none
-        ),
-    ]
+    drawn = {
+        ("mean-size", "Mean size over time"): ("blocks per assembly", {"mean_size": ""}),
+        ("size-shares", "Largest assembly and free blocks"): ("share of the blocks", shares),
+    }
+    # Older files have none.
+    if all("compactness" in one for one in found.values()):
+        ratio = ("least perimeter over perimeter", {"compactness": ""})
+        drawn["compactness", "Compactness over time"] = ratio
+    made = parts.attempt("sizes", "Sizes of the assemblies", lambda: sizes_section(found))
+    for (id, title), (words, names) in drawn.items():
+        made += parts.attempt(id, title, partial(_over_time, found, words, names))
+    return made
 
 
-def _over_time(
-    found: dict[str, xr.Dataset], id: str, title: str, words: str, names: dict[str, str]
-) -> list[Section]:
-    def section_of() -> Section:
-        time, drawn = parts.label("time", "s"), _courses(found, names)
-        return parts.chart(id, title, _note(found), x=time, y=parts.label(words), series=drawn)
-
-    return parts.attempt(id, title, section_of)
+def _over_time(found: dict[str, xr.Dataset], words: str, names: dict[str, str]) -> Section:
+    drawn = []
+    for kind, one in found.items():
+        require(one, "time", *names)
+        for name, of in names.items():
+            both = (of, kind if len(found) > 1 or not of else "")
+            text = ", ".join(part for part in both if part)
+            drawn.append(parts.course(text, one["time"].values, one, name))
+    time = parts.label("time", "s")
+    return parts.chart(_note(found), x=time, y=parts.label(words), series=drawn)
 
 
 def sizes_section(found: dict[str, xr.Dataset]) -> Section:
@@ -214,7 +200,7 @@ def sizes_section(found: dict[str, xr.Dataset]) -> Section:
     grouped = "Sizes that share a point, at their geometric mean"
     note = f"{grouped}: {', '.join(groups)}. " if groups else ""
     return parts.chart(
-        "sizes", "Sizes of the assemblies", f"At the end of the runs. {note}{_note(found)}",
+        f"At the end of the runs. {note}{_note(found)}",
         x=parts.label("blocks in the assembly", log=True), y=parts.label("share of the blocks"),
         series=drawn,
     )  # fmt: skip
@@ -237,17 +223,6 @@ def size_numbers(sizes: xr.Dataset) -> list[dict[str, Any]]:
     ]
     note = "least perimeter over perimeter"
     return [*shown, parts.figure_with_ends(sizes, "compactness", "compactness", note=note)]
-
-
-def _courses(found: dict[str, xr.Dataset], names: dict[str, str]) -> list[dict[str, Any]]:
-    drawn = []
-    for kind, one in found.items():
-        require(one, "time", *names)
-        for name, words in names.items():
-            both = (words, kind if len(found) > 1 or not words else "")
-            text = ", ".join(part for part in both if part)
-            drawn.append(parts.course(text, one["time"].values, one, name))
-    return drawn
 
 
 def _note(found: dict[str, xr.Dataset]) -> str:

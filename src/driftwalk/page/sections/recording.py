@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.units import percent
 from driftwalk.page import parts
@@ -84,17 +84,18 @@ def recording_sections(
     """
     names = body_names(check_trajectory(trajectory))
     chosen = names[: SECTION.most_bodies] if body is None else [body]
-    noises = _by_body(noise, chosen)
+    if not isinstance(noise, Mapping):
+        # Of several bodies it is unknown which one's it is.
+        noise = {chosen[0]: noise} if len(chosen) == 1 else {}
     made: list[Section] = []
     for number_of, name in enumerate(chosen, start=1):
         id = f"recording-{number_of}"
         title = "The recording" if len(names) == 1 else f"The recording, body {name}"
-        make = partial(trajectory_section, trajectory, body=name, noise=noises.get(name), id=id)
+        make = partial(trajectory_section, trajectory, body=name, noise=noise.get(name), id=id)
         made += parts.attempt(id, title, make)
-    if body is None and len(names) > SECTION.most_bodies:
-        made[-1]["note"] = (
-            f"{made[-1]['note'] or ''} {len(names) - SECTION.most_bodies} more bodies."
-        )
+    more = len(names) - SECTION.most_bodies
+    if body is None and more > 0:
+        made[-1]["note"] = f"{made[-1]['note'] or ''} {more} more bodies."
     return made
 
 
@@ -141,7 +142,9 @@ def trajectory_section(
         raise InputError(f"the recording has {count(track.time.size, 'position')}: nothing to show")
     interval = np.diff(track.time)
     gap = interval > GAP_INTERVALS * np.median(interval)
-    shown, every = _shown(track, interval, gap)
+    ends = np.flatnonzero(gap)
+    longest = ends[np.argsort(-interval[ends], kind="stable")[: SECTION.most_gaps]]
+    shown, every = _shown(track, longest)
     step = binary_step(max(float(np.ptp(track.x)), float(np.ptp(track.y))), SECTION.position_parts)
     path: dict[str, Any] = {
         "time": encode_array(shown.time, step=SECTION.time_step_s, offset=float(shown.time[0])),
@@ -170,7 +173,7 @@ def trajectory_section(
         id, "trajectory", title, " ".join(notes),
         arena=parts.arena_part(trajectory),
         **path,
-        gaps=_gaps(track, interval, gap),
+        gaps=track.time[np.sort(longest)[:, None] + np.arange(2)].tolist(),
         speed=_speed_density(speed, top),
         facts=[*_facts(track, interval, gap, speed, noise), *_ambiguity(trajectory, body)],
     )  # fmt: skip
@@ -200,37 +203,17 @@ def noise_of(described: Mapping[str, Any], body: str) -> Noise | None:
     return Noise(value, max(value - error, 0.0), value + error, words)
 
 
-def _by_body(
-    noise: Noise | Mapping[str, Noise | None] | None, chosen: list[str]
-) -> Mapping[str, Noise | None]:
-    if isinstance(noise, Mapping):
-        return noise
-    # Of several bodies it is unknown which one's it is.
-    return {chosen[0]: noise} if len(chosen) == 1 else {}
-
-
-def _shown(track: Track, interval: Floats, gap: Bools) -> tuple[Track, int]:
+def _shown(track: Track, longest: Integers) -> tuple[Track, int]:
     """Return what is shown of a track, broken by NaN at gaps, and every how manyth sample it is."""
     size = track.time.size
-    ends = np.flatnonzero(gap)
-    longest = ends[np.argsort(-interval[ends], kind="stable")[: SECTION.most_gaps]]
     room = max(SECTION.most_samples - 3 * longest.size - 1, 1)
     every = max(1, -(-size // room))
     kept = np.unique(np.concatenate([np.arange(0, size, every), longest, longest + 1, [size - 1]]))
-    columns = [column[kept] for column in track]
     after = np.searchsorted(kept, longest) + 1
     middle = 0.5 * (track.time[longest] + track.time[longest + 1])
-    filled = [middle, *(np.full(longest.size, np.nan) for _ in columns[1:])]
-    time, x, y, theta = (
-        np.insert(column, after, values) for column, values in zip(columns, filled, strict=True)
-    )
+    time = np.insert(track.time[kept], after, middle)
+    x, y, theta = (np.insert(column[kept], after, np.nan) for column in track[1:])
     return Track(time, x, y, theta), every
-
-
-def _gaps(track: Track, interval: Floats, gap: Bools) -> list[list[float]]:
-    ends = np.flatnonzero(gap)
-    longest = np.sort(ends[np.argsort(-interval[ends], kind="stable")[: SECTION.most_gaps]])
-    return [[float(track.time[i]), float(track.time[i + 1])] for i in longest]
 
 
 def _top_speed(speed: Floats) -> float:

@@ -130,7 +130,7 @@ def errors_section(recovery: xr.Dataset) -> Section:
     """Return the table of errors and coverage."""
     table = parts.answer_table(recovery_answer(recovery))
     note = "Errors are relative to the truth."
-    return parts.section_of_table("errors", "Errors and intervals", table, note)
+    return parts.section_of_table(table, note)
 
 
 def by_length_section(recovery: xr.Dataset) -> Section:
@@ -144,7 +144,7 @@ def by_length_section(recovery: xr.Dataset) -> Section:
     wanted = value_of(recovery, "drag_coefficient_precision")
     marks = [] if wanted is None else [parts.mark("wanted", y=wanted)]
     return parts.chart(
-        "by-length", "Error by length", "Root mean square of ln(estimate / truth).",
+        "Root mean square of ln(estimate / truth).",
         x=parts.label("length of a recording", "s", log=True),
         y=parts.label("error of C_d", log=True), series=drawn, marks=marks,
     )  # fmt: skip
@@ -163,14 +163,11 @@ def estimates_section(recovery: xr.Dataset, *, name: str) -> Section:
             (f"{words}, left out of the summary", at, ~used, values),
         ]
     return _estimates_chart(
-        _id_of(name), f"Estimates: {parameter.words}",
         parts.label(parameter.words, parameter.unit), required(recovery, parameter.key), drawn,
     )  # fmt: skip
 
 
-def _estimates_chart(
-    id: str, title: str, y: Any, truth: float, drawn: Iterable[tuple[str, Any, Any, Any]]
-) -> Section:
+def _estimates_chart(y: Any, truth: float, drawn: Iterable[tuple[str, Any, Any, Any]]) -> Section:
     """Return a chart of words, places, which are shown, and estimates with both ends."""
     shown = []
     for words, at, kept, values in drawn:
@@ -178,7 +175,7 @@ def _estimates_chart(
             value, low, high = (np.where(kept, one, np.nan) for one in values)
             shown.append(parts.series(words, at, value, ends=(low, high), style="points"))
     return parts.chart(
-        id, title, "Each point is a recording, with its interval.", x=parts.label("recording"), y=y,
+        "Each point is a recording, with its interval.", x=parts.label("recording"), y=y,
         series=shown, marks=[parts.mark("truth", y=truth)],
     )  # fmt: skip
 
@@ -191,7 +188,7 @@ def flow_error_section(recovery: xr.Dataset) -> Section:
         error = np.where(part["used"].values == 1, part["flow_error"].values, np.nan)
         drawn.append(parts.series(words, at, error, style="points"))
     return parts.chart(
-        "flow-error", "Error of the flow", "Rms error over rms speed, averaged over the block.",
+        "Rms error over rms speed, averaged over the block.",
         x=parts.label("recording"), y=parts.label("relative error"), series=drawn,
     )  # fmt: skip
 
@@ -233,12 +230,8 @@ def model_recovery_sections(model_recovery: xr.Dataset | None) -> list[Section]:
     pieces: tuple[tuple[str, str, Maker], ...] = (
         ("errors", "Errors and intervals", model_errors_section),
         *(
-            (
-                f"estimates-{at}",
-                f"Estimates: {name}",
-                partial(model_estimates_section, index=at - 1),
-            )
-            for at, name in enumerate(names, start=1)
+            (f"estimates-{at + 1}", f"Estimates: {one}", partial(model_estimates_section, index=at))
+            for at, one in enumerate(names)
         ),
     )
     return parts.sections_of(found, reason, model_summary_section, model_warnings, pieces)
@@ -271,7 +264,7 @@ def model_errors_section(recovery: xr.Dataset) -> Section:
     table = parts.answer_table(model_recovery_answer(recovery))
     meanings = map(str, recovery["meaning"].values)
     return parts.table_section(
-        "errors", "Errors and intervals", [*table.columns, "meaning"],
+        [*table.columns, "meaning"],
         [[*row, words] for row, words in zip(table.rows, meanings, strict=True)],
         "Errors are relative to the truth. A parameter is determined where its 90 % interval ends "
         "within 15 % of its value.",
@@ -286,7 +279,6 @@ def model_estimates_section(recovery: xr.Dataset, *, index: int) -> Section:
     values = [one["estimate"].values, *one["interval"].transpose("bound", "recording").values]
     known, name = one["determined"].values.astype(bool), str(one["parameter"].values)
     return _estimates_chart(
-        f"estimates-{index + 1}", f"Estimates: {name}",
         parts.label(name.replace("_", " "), str(one["unit"].values)), float(one["truth"]),
         [("determined", at, known, values), ("not determined", at, ~known, values)],
     )  # fmt: skip

@@ -79,7 +79,7 @@ def _run(path: xr.Dataset, index: int, assembly: xr.Dataset | None, step: float)
     )
     # From the path's own numbering: its first run need not be the first of all.
     number_of = int(path["run"]) if "run" in path.coords else index
-    events = [] if assembly is None else _events(assembly, number_of)
+    events, classes = ([], []) if assembly is None else _changes(assembly, number_of)
     turned = np.angle(np.exp(1j * theta.astype(np.float64)))
     return {
         "name": f"run {number_of}",
@@ -88,17 +88,17 @@ def _run(path: xr.Dataset, index: int, assembly: xr.Dataset | None, step: float)
         "theta": encode_array(turned, step=2.0**-9),
         "assembly": encode_array(joined),
         "events": events,
-        "classes": _classes(assembly, number_of, events),
+        "classes": classes,
     }
 
 
-def _events(assembly: xr.Dataset, run: int) -> list[dict[str, Any]]:
-    """Return what joined and parted in a run, in the order of time."""
+def _changes(assembly: xr.Dataset, run: int) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return what joined and parted in a run over time, and the class from each change on."""
     require(assembly, "event_count", "event_time", "event_block", "event_class", "class")
     if run not in assembly["run"].values:
-        return []
+        return [], []
     found = assembly.sel(run=run)
-    return [
+    events = [
         {
             "time": float(found["event_time"].values[event]),
             "blocks": [int(block) for block in found["event_block"].values[event]],
@@ -108,17 +108,8 @@ def _events(assembly: xr.Dataset, run: int) -> list[dict[str, Any]]:
         # Kinds 2 and 3: what happens to a bond of a loop changes no assembly.
         if "event_kind" not in found or int(found["event_kind"].values[event]) < 2
     ]
-
-
-def _classes(
-    assembly: xr.Dataset | None, run: int, events: list[dict[str, Any]]
-) -> list[dict[str, Any]]:
-    """Return the class of all blocks from each change on."""
-    if assembly is None or run not in assembly["run"].values:
-        return []
-    blocks = assembly.sizes.get("block", 0)
-    start = {"time": 0.0, "class": all_single(blocks)}
-    return [start, *({"time": event["time"], "class": event["class"]} for event in events)]
+    start = {"time": 0.0, "class": all_single(assembly.sizes.get("block", 0))}
+    return events, [start, *({key: one[key] for key in ("time", "class")} for one in events)]
 
 
 def _class(assembly: xr.Dataset, index: int) -> str:

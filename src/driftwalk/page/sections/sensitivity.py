@@ -16,9 +16,9 @@ from driftwalk.page.sections.outcomes import cells_of, classes_section
 from driftwalk.page.sections.sensitivity_maps import (
     l1_sections,
     require_axes,
+    setting_names,
     setting_sections,
     times_sections,
-    value_words,
 )
 from driftwalk.plot.components import biplot_of
 from driftwalk.plot.parts.outcome_classes import are_discs
@@ -74,12 +74,8 @@ def sensitivity_sections(
             ("times", "Outcome classes over time", times_sections),
         ),
     )
-    if reference is not None:
-        id, title = "reference", "The reference"
-        made += parts.attempt(
-            id, title, lambda: classes_section({"reference": reference}, id=id, title=title)
-        )
     return made + parts.attempts(
+        ("reference", "The reference", lambda one: classes_section({"reference": one}), reference),
         ("biplot", "Principal components", partial(biplot_section, components), sensitivity),
         ("sobol", "Sobol' indices", sobol_section, sobol),
     )
@@ -150,12 +146,6 @@ def biplot_section(components: xr.Dataset | None, sensitivity: xr.Dataset) -> Se
         for name in ("complete", "l1_distance")
         if name in sensitivity and set(map(str, sensitivity[name].dims)) == set(dims)
     }
-    settings = parts.settings_of(
-        *(
-            [f"{axis_number(n).plain} {value_words(n, v)}" for v in sensitivity[n].values]
-            for n in dims
-        )
-    )
     return parts.section(
         "biplot", "biplot", "Principal components",
         "Points are settings, arrows the loadings of the classes, "
@@ -166,7 +156,7 @@ def biplot_section(components: xr.Dataset | None, sensitivity: xr.Dataset) -> Se
         ],
         points={
             "x": numbers(found.points[:, 0]), "y": numbers(found.points[:, 1]),
-            "names": [", ".join(words) for words in settings], "values": values or None,
+            "names": setting_names(sensitivity, dims), "values": values or None,
         },
         arrows=[
             {
@@ -197,7 +187,6 @@ def sobol_section(sobol: xr.Dataset) -> Section:
         for output, (k, words) in product(sorted(map(int, order)), enumerate(inputs))
     ]
     return parts.table_section(
-        "sobol", "Sobol' indices",
         ["output", "input", "first order", "± half width", "total", "± half width"], rows,
         "Share of an output's variance that an input explains alone (first order), "
         "and together with the others (total).",

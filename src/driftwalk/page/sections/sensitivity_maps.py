@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -60,10 +61,17 @@ def axis_of(part: xr.Dataset, name: str) -> dict[str, Any]:
 
 
 def value_words(name: str, value: Any) -> str:
-    """Return a value of an axis with its unit, as it stands in a sentence."""
+    """Return an axis and a value of it with its unit, as they stand in a sentence."""
+    number = axis_number(name)
     if isinstance(value, str):
-        return value.replace("_", " ")
-    return quantity(float(value), axis_number(name).unit)
+        return f"{number.plain} {value.replace('_', ' ')}"
+    return f"{number.plain} {quantity(float(value), number.unit)}"
+
+
+def setting_names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
+    """Return the values of every setting of a study along some axes, the last one fastest."""
+    values = ([value_words(name, one) for one in part[name].values.tolist()] for name in dims)
+    return [", ".join(words) for words in parts.settings_of(*values)]
 
 
 def l1_sections(sensitivity: xr.Dataset) -> list[Section]:
@@ -92,7 +100,7 @@ def l1_sections(sensitivity: xr.Dataset) -> list[Section]:
         x, y = map_axes(part)
         title = f"Distance to the reference{words}"
         if y is None or not _is_map(part):
-            made.append(_lines(part, "l1_distance", id, title, "l1 distance", noise=True))
+            made.append(_lines(part, "l1_distance", id, title, "l1 distance"))
         else:
             made.append(_l1_map(part, x, y, id, title))
     return made
@@ -157,7 +165,7 @@ def _l1_map(part: xr.Dataset, x: str, y: str, id: str, title: str) -> Section:
     note = "0: the same outcomes as the reference; 2: none in common."
     if floor is not None:
         note += f" Chance alone gives up to {floor:.3g} (95 %)."
-    at = [_reference(part, name) for name in (x, y)]
+    at = [value_of(part, f"reference_{axis_number(name).key}") for name in (x, y)]
     return parts.section(
         id, "l1_map", title, note,
         x=axis_of(part, x), y=axis_of(part, y),
@@ -173,14 +181,7 @@ def _l1_map(part: xr.Dataset, x: str, y: str, id: str, title: str) -> Section:
 
 
 def _lines(
-    part: xr.Dataset,
-    variable: str,
-    id: str,
-    title: str,
-    words: str,
-    *,
-    unit: str = "1",
-    noise: bool = False,
+    part: xr.Dataset, variable: str, id: str, title: str, words: str, *, unit: str = "1"
 ) -> Section:
     """Return a variable along one axis, or along numbers for each word of another."""
     x, y = map_axes(part)
@@ -193,23 +194,16 @@ def _lines(
     else:
         for value in part[y].values:
             one = part[variable].sel({y: value}).values
-            drawn.append(
-                parts.series(
-                    f"{axis_number(y).plain} {value_words(y, value)}",
-                    positions,
-                    one,
-                    style="points",
-                )
-            )
+            drawn.append(parts.series(value_words(y, value), positions, one, style="points"))
     marks = []
     floor = value_of(part, "noise_floor_95")
-    if noise and floor is not None:
+    if variable == "l1_distance" and floor is not None:
         marks.append(parts.mark("by chance, 95 %", y=floor))
     across = axis_number(x)
     return parts.chart(
-        id, title, note or None,
+        note or None,
         x=parts.label(across.words, across.unit), y=parts.label(words, unit),
-        series=drawn, marks=marks,
+        series=drawn, marks=marks, id=id, title=title,
     )  # fmt: skip
 
 
@@ -229,13 +223,9 @@ def _slices(sensitivity: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     pieces = []
     for values in parts.settings_of(*(sensitivity[name].values.tolist() for name in fixed)):
         chosen = dict(zip(fixed, values, strict=True))
-        words = "".join(f", {axis_number(n).plain} {value_words(n, v)}" for n, v in chosen.items())
+        words = "".join(f", {value_words(name, one)}" for name, one in chosen.items())
         pieces.append((words, sensitivity.sel(chosen)))
     return pieces
-
-
-def _reference(part: xr.Dataset, name: str) -> float | None:
-    return value_of(part, f"reference_{axis_number(name).key}")
 
 
 def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any]:
@@ -288,12 +278,7 @@ def setting_times_section(part: xr.Dataset, id: str, where: str) -> Section:
     row = part.drop_vars(dims).stack(x=dims, create_index=False)
     row = row.assign({name: row[name].expand_dims("y") for name in ("count_over_time", "runs")})
     found = over_time_part(row, "x", "y")
-    settings = [
-        ", ".join(
-            f"{axis_number(n).plain} {value_words(n, v)}" for n, v in zip(dims, place, strict=True)
-        )
-        for place in parts.settings_of(*(part[name].values.tolist() for name in dims))
-    ]
+    settings = setting_names(part, dims)
     return parts.section(id, "setting_times", title, None, settings=settings, over_time=found)
 
 

@@ -91,7 +91,6 @@ def front_section(yields: xr.Dataset) -> Section:
         for at in order[:MOST_CURVES]
     ]
     return parts.chart(
-        "front", "Front of yield and time",
         "From fresh runs; for each time the setting was chosen by the runs before them.",
         x=parts.label("time", "s"), y=parts.label("share of runs with the target"), series=drawn,
         marks=[parts.mark(f"deadline {yields.attrs['by_s']:g} s", x=yields.attrs["by_s"])],
@@ -116,7 +115,7 @@ def along_sections(yields: xr.Dataset) -> list[Section]:
         number = axis_number(name)
         found.append(
             parts.chart(
-                f"along-{name}", f"Yield along {number.plain}", "In the choosing runs.",
+                "In the choosing runs.", id=f"along-{name}", title=f"Yield along {number.plain}",
                 x=parts.label(number.words, number.unit), y=parts.label("yield"), series=drawn,
             )
         )  # fmt: skip

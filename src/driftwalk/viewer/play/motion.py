@@ -137,10 +137,7 @@ class MotionWindow:
         if len(place) < 3:
             return np.empty((0, 2))
         plan = plan_steps(self.interval * np.arange(len(place)), step_interval=self.interval)
-        found = [
-            apply_steps(plan, place[:, block, 0], place[:, block, 1])
-            for block in range(place.shape[1])
-        ]
+        found = [apply_steps(plan, *place[:, block].T) for block in range(place.shape[1])]
         return np.concatenate(
             [np.column_stack([steps.step_length, steps.turning_angle]) for steps in found]
         )
@@ -158,22 +155,21 @@ class MotionWindow:
             angles = turning_angle_edges()
         else:
             lengths, angles = recording.steps.length_edge, recording.steps.angle_edge
-        shape = (lengths.size - 1, angles.size - 1)
-        density = np.zeros(shape)
+        density = np.zeros((lengths.size - 1, angles.size - 1))
         if len(points):
             density = joint_density(*points.T, step_length_edge=lengths, turning_angle_edge=angles)
+        distance = floor = None
         # Fewer steps have no distance that means anything.
-        enough = recording is not None and len(points) >= 30
+        if recording is not None and len(points) >= 30:
+            distance, floor = recording.reference.distance(points), self._noise_floor(points)
         return {
             "type": "density",
             "simulated": encode_array(density),
             "recording": None if recording is None else encode_array(recording.steps.density()),
             "step_length_edges": lengths.tolist(),
             "turning_angle_edges": angles.tolist(),
-            "ks_distance": recording.reference.distance(points)
-            if enough and recording is not None
-            else None,
-            "noise_floor": self._noise_floor(points) if enough else None,
+            "ks_distance": distance,
+            "noise_floor": floor,
             "steps": len(points),
         }
 

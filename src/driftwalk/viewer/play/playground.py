@@ -18,7 +18,7 @@ from driftwalk.assembly import LiveTank
 from driftwalk.core.arrays import Floats
 from driftwalk.schema.shapes import MOST_NAMED
 from driftwalk.viewer.play.playground_base import Playground
-from driftwalk.viewer.play.settings import knobs_for, most_blocks_in, values_of
+from driftwalk.viewer.play.settings import knobs_for, values_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -249,7 +249,7 @@ class PlaySource(Playground):
         if recording is not None:
             self.density_note += " The recording is of one block: compare it with one in the tank."
         self.tank, self.water = LiveTank(study, flow, blocks=blocks, seed=seed), flow
-        knobs = knobs_for(self.tank, most_blocks=most_blocks_in(self.tank))
+        knobs = knobs_for(self.tank)
         super().__init__(study, flow, knobs, recording=recording, body=body, seed=seed)
         self._stream: Stream | None = None
         self._frames = 0

@@ -171,12 +171,11 @@ class Playground(Source):
     def _act(self, name: str) -> None:
         if name in ("pause", "run"):
             self._paused = name == "pause"
-        elif name == "clear":
-            self.motion.clear()
-        else:
+            return
+        if name == "restart":
             self._seed += 1
             self._restart()
-            self.motion.clear()
+        self.motion.clear()
 
     def _move(self, publish: Publish) -> None:
         """Advance the tank with the clock, picture by picture, until the server ends."""
@@ -264,25 +263,14 @@ class Playground(Source):
         return section("controls", "controls", "Settings", self.controls_note, items=items)
 
     def _page(self) -> dict[str, Any]:
+        arena, title = self._study.tank.to_arena(), "Step length and turning angle"
         recording = None if self.recording is None else self.recording.steps.name
-        title = "Step length and turning angle"
-        return page_frame(
-            self.view,
-            self.title,
-            subtitle=self._subtitle(),
-            sections=[
-                section(
-                    "tank",
-                    "tank",
-                    "The tank",
-                    arena=self._study.tank.to_arena(),
-                    flow=self._arrows,
-                    **self._bodies(),
-                ),
-                self._controls(),
-                section("density", "density", title, self.density_note, recording=recording),
-            ],
-        )
+        sections = [
+            section("tank", "tank", "The tank", arena=arena, flow=self._arrows, **self._bodies()),
+            self._controls(),
+            section("density", "density", title, self.density_note, recording=recording),
+        ]
+        return page_frame(self.view, self.title, subtitle=self._subtitle(), sections=sections)
 
     def _subtitle(self) -> str:
         """Return what moves where."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import math
 import zlib
+from collections.abc import Callable
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -131,46 +133,41 @@ def _rules(plan: Plan) -> dict[str, float]:
 def _choices(source: PlaySource) -> dict[str, dict[str, Any]]:
     """Return what the options of a choice mean to the native core, by knob and option."""
     study = source.tank.study
-    keys = {
+    keys: dict[str, tuple[str, Callable[[Study], Any]]] = {
         "faces": ("assembly.faces", _faces),
-        "hidden_face_drag": ("assembly.hidden_face_drag", _hidden_share),
+        "hidden_face_drag": ("assembly.hidden_face_drag", attrgetter("assembly.hidden_share")),
         "magnets": ("interaction.magnets", _pull),
     }
     return {
         "latching": {word: number for number, word in enumerate(WORDS["latching"])},
         **{
             name: {
-                choice: meaning(_with(study, key, choice)) for choice in source.knobs[name].choices
+                choice: _meaning(study, key, choice, of) for choice in source.knobs[name].choices
             }
-            for name, (key, meaning) in keys.items()
+            for name, (key, of) in keys.items()
             if name in source.knobs
         },
     }
 
 
-def _with(study: Study, key: str, choice: Any) -> Study | None:
-    """Return a study with another value; None where the two contradict each other."""
+def _meaning(study: Study, key: str, choice: Any, of: Callable[[Study], Any]) -> Any:
+    """Return what another value means; None where it contradicts the study."""
     try:
-        return apply_overrides(study, {key: choice})
+        other = apply_overrides(study, {key: choice})
     except InputError:
         return None
+    return of(other)
 
 
-def _hidden_share(study: Study | None) -> float | None:
-    return None if study is None else study.assembly.hidden_share
+def _faces(study: Study) -> dict[str, Any] | None:
+    table = face_table(study.assembly)
+    if table is None:
+        return None
+    return {name: np.asarray(value).ravel().tolist() for name, value in table._asdict().items()}
 
 
-def _faces(study: Study | None) -> dict[str, Any] | None:
-    table = None if study is None else face_table(study.assembly)
-    return (
-        None
-        if table is None
-        else {name: np.asarray(value).ravel().tolist() for name, value in table._asdict().items()}
-    )
-
-
-def _pull(study: Study | None) -> dict[str, Any] | None:
-    pull = None if study is None else block_pull(study)
+def _pull(study: Study) -> dict[str, Any] | None:
+    pull = block_pull(study)
     if pull is None:
         return None
     tables, oriented, far = pull.tables, pull.tables.oriented, pull.tables.multipoles

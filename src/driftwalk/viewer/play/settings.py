@@ -114,15 +114,13 @@ KNOBS: Final = (
 """Ranges hold the values of the paper with room to either side; chosen by hand."""
 
 
-def knobs_for(tank: LiveTank, *, most_blocks: int) -> dict[str, Knob]:
+def knobs_for(tank: LiveTank) -> dict[str, Knob]:
     """Return the settings of a tank by name.
 
     Parameters
     ----------
     tank : LiveTank
         Whose values every range has to hold.
-    most_blocks : int
-        Blocks that the tank has room for.
     """
     values = values_of(tank, speed=1.0)
     knobs = {knob.name: knob.reaching(values[knob.name]) for knob in KNOBS}
@@ -130,7 +128,10 @@ def knobs_for(tank: LiveTank, *, most_blocks: int) -> dict[str, Knob]:
         # Discs have no faces, and rectangles latch as they lie.
         del knobs["hidden_face_drag"], knobs["faces"], knobs["magnets"]
         knobs["latching"] = replace(knobs["latching"], choices=("collision", "none"))
-    return knobs | {"blocks": replace(knobs["blocks"], most=most_blocks)}
+    # As many blocks as still have room to move.
+    room = FILLED * tank_area(tank.study.tank) / tank.study.block.area_m2
+    most = max(min(int(room), MOST_BLOCKS), tank.study.assembly.blocks)
+    return knobs | {"blocks": replace(knobs["blocks"], most=most)}
 
 
 def values_of(tank: LiveTank, *, speed: float) -> dict[str, Any]:
@@ -149,10 +150,3 @@ def values_of(tank: LiveTank, *, speed: float) -> dict[str, Any]:
         "magnets": tank.study.interaction.magnets,
         "speed": speed,
     }
-
-
-def most_blocks_in(tank: LiveTank) -> int:
-    """Return how many blocks the playground offers: those that still have room to move."""
-    study = tank.study
-    room = FILLED * tank_area(study.tank) / study.block.area_m2
-    return max(min(int(room), MOST_BLOCKS), study.assembly.blocks)

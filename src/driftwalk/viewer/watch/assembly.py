@@ -6,7 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from driftwalk.assembly import (
     sort_classes,
     world_class,
 )
+from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.outcome_classes import disc_class
 from driftwalk.assembly.sensitivity.times import (
     Courses,
@@ -27,8 +28,9 @@ from driftwalk.assembly.sensitivity.times import (
     kept_times,
 )
 from driftwalk.core.units import in_percent
+from driftwalk.model import Study
 from driftwalk.page import encode_array
-from driftwalk.page.parts import axis, empty_section, section, table_section
+from driftwalk.page.parts import Section, axis, empty_section, section, table_section
 from driftwalk.page.sections.outcomes import cells_of, class_items
 from driftwalk.page.sections.sensitivity_maps import over_time_part
 from driftwalk.plot.parts.outcome_classes import are_discs, class_names, classes_to_show
@@ -36,11 +38,8 @@ from driftwalk.schema.answers.yields import LISTED, point_words
 from driftwalk.schema.kinds.sensitivity import axis_number, ranked_axes
 from driftwalk.schema.shapes import counted_assemblies
 from driftwalk.simulation.backend import BROKEN
-from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
+from driftwalk.viewer.watch.run_page import NO_CELL, Running
 from driftwalk.viewer.watch.shards import FinishedUnit
-
-if TYPE_CHECKING:
-    from driftwalk.model import Study
 
 NAMES: Final = {"fixed": "parameters found", "drawn": "parameters drawn"}
 """The sweeps of such a run, and what their bars are called."""
@@ -58,22 +57,13 @@ class RunningAssembly(Running):
     """
 
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
-        from driftwalk.model import Study
-
         super().__init__(folder, specification)
-        self._study: Study = Study(**specification["study"])
+        self._study = Study(**specification["study"])
         both = specification.get("calibration_sha256") is not None
-        self._names = dict(NAMES) if both else {"fixed": "all runs"}
+        self._sweeps = self._names = dict(NAMES) if both else {"fixed": "all runs"}
         self._count: dict[str, Counter[str]] = {name: Counter() for name in self._names}
         self._runs = dict.fromkeys(self._names, 0)
         self._class_of: dict[bytes, str] = {}
-
-    def look(self) -> list[Section]:
-        """Read the new shards; return the proportions if there are any."""
-        units = list(self._reader.new_units(self._names))
-        for name, unit in units:
-            self._take(name, unit)
-        return self.sections() if units else []
 
     def sections(self) -> list[Section]:
         """Return the shares of the classes up to now."""
@@ -142,17 +132,13 @@ class RunningYield(Running):
         self._runs: dict[bool, Counter[str]] = {False: Counter(), True: Counter()}
         self._reached: dict[bool, Counter[str]] = {False: Counter(), True: Counter()}
 
-    def look(self) -> list[Section]:
-        """Read the new shards; return the settings if there are any."""
-        units = list(self._reader.new_units())
-        for name, unit in units:
-            sweep = self._reader.sweeps[name].sweep
-            words, each = [point_words(one) for one in sweep["settings"]], int(sweep["runs"])
-            fresh = name.startswith("fresh")
-            for row, hit in enumerate(unit.arrays["reached"][:, -1], start=unit.start):
-                self._runs[fresh][words[row // each]] += 1
-                self._reached[fresh][words[row // each]] += int(hit)
-        return self.sections() if units else []
+    def _take(self, name: str, unit: FinishedUnit) -> None:
+        sweep = self._reader.sweeps[name].sweep
+        words, each = [point_words(one) for one in sweep["settings"]], int(sweep["runs"])
+        fresh = name.startswith("fresh")
+        for row, hit in enumerate(unit.arrays["reached"][:, -1], start=unit.start):
+            self._runs[fresh][words[row // each]] += 1
+            self._reached[fresh][words[row // each]] += int(hit)
 
     def sections(self) -> list[Section]:
         """Return the settings up to now; fresh runs have a table of their own."""
@@ -174,7 +160,7 @@ class RunningYield(Running):
             rows.append([words, f"{k / n:.3f}", ends, n])
         title = "Fresh runs" if fresh else "Settings so far"
         columns = ["setting", "yield", f"{in_percent(self._confidence)} interval", "runs"]
-        return table_section("fresh" if fresh else "chosen", title, columns, rows)
+        return table_section(columns, rows, id="fresh" if fresh else "chosen", title=title)
 
 
 class RunningSensitivity(Running):
@@ -189,26 +175,19 @@ class RunningSensitivity(Running):
     """
 
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
-        from driftwalk.model import Study
-
         super().__init__(folder, specification)
-        self._study: Study = Study(**specification["study"])
+        self._study = Study(**specification["study"])
         self._axes = dict(self._study.sensitivity.axes)
         self._shape = tuple(len(values) for values in self._axes.values())
-        self._count: dict[str, dict[int, Counter[str]]] = {"reference": {}, "map": {}}
+        self._sweeps = ("reference", "map")
+        self._count: dict[str, dict[int, Counter[str]]] = {name: {} for name in self._sweeps}
         # As text: few of the settings are ever asked for.
-        self._courses: dict[str, dict[int, bytes]] = {"reference": {}, "map": {}}
+        self._courses: dict[str, dict[int, bytes]] = {name: {} for name in self._sweeps}
 
-    def look(self) -> list[Section]:
-        """Read the new shards; return the map if it has changed."""
-        changed = False
-        for name, unit in self._reader.new_units(self._count):
-            changed = True
-            for row, text in enumerate(unit.arrays["count"]):
-                self._count[name][unit.start + row] = Counter(json.loads(text))
-            for row, text in enumerate(unit.arrays["courses"]):
-                self._courses[name][unit.start + row] = text
-        return self.sections() if changed else []
+    def _take(self, name: str, unit: FinishedUnit) -> None:
+        counts = (Counter(json.loads(text)) for text in unit.arrays["count"])
+        self._count[name].update(enumerate(counts, unit.start))
+        self._courses[name].update(enumerate(unit.arrays["courses"], unit.start))
 
     def sections(self) -> list[Section]:
         """Return the map up to now: of the last two axes, the others at their first value."""
@@ -316,8 +295,6 @@ def _shares(count: Mapping[str, int]) -> dict[str, float]:
 
 def _blocks(count: Mapping[str, int]) -> int:
     """Return the number of blocks of the classes that were counted, 0 where these do not say it."""
-    from driftwalk.assembly.lattice.polyomino import shape_size
-
     name = next(iter(count), None)
     return 0 if name is None or counted_assemblies(name) else sum(map(shape_size, name.split("+")))
 

@@ -19,19 +19,24 @@ from driftwalk.core.calibration_stages import (
 )
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.files.run_layout import run_file
+from driftwalk.flow import load_flow
+from driftwalk.model import Study
 from driftwalk.page import encode_array
+from driftwalk.page.parts import Section
 from driftwalk.page.sections.calibration import bootstrap_section, one_body, profile_sections
+from driftwalk.page.sections.flow import flow_section
 from driftwalk.page.sections.map import map_section
+from driftwalk.page.sections.recording import trajectory_section
+from driftwalk.record import load
 from driftwalk.schema import Parameter
 from driftwalk.schema.parameters import BLOCK
-from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
+from driftwalk.viewer.watch.recording_steps import RecordedSteps, recorded_steps
+from driftwalk.viewer.watch.run_page import NO_CELL, Running
 from driftwalk.viewer.watch.shards import FinishedUnit
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
-    from driftwalk.viewer.watch.recording_steps import RecordedSteps
 
 DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
 
@@ -87,11 +92,9 @@ class RunningCalibration(Running):
     """
 
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
-        from driftwalk.model import Study
-
         super().__init__(folder, specification)
         self._folder = folder
-        self._study: Study = Study(**specification["study"])
+        self._study = Study(**specification["study"])
         self._body: str | None = specification.get("body")
         self._parameters = _parameters(specification, self._study)
         self._maps: dict[str, SettingsMap] = {}
@@ -123,7 +126,7 @@ class RunningCalibration(Running):
             if stage == "refined":
                 self._refined = of_map
             for unit in reader.new_units():
-                changed |= self._take(name, stage, unit)
+                changed |= self._take_of(name, stage, unit)
         made = {"map": self._map_section, "bootstrap": self._bootstrap_section}
         return [made[name]() for name in sorted(changed, reverse=True)]
 
@@ -163,7 +166,7 @@ class RunningCalibration(Running):
             "ks_turning_angle": float(kept["ks_turning_angle"][nearest]),
         }
 
-    def _take(self, name: str, stage: str, unit: FinishedUnit) -> set[str]:
+    def _take_of(self, name: str, stage: str, unit: FinishedUnit) -> set[str]:
         """Take a work unit, and return the sections that it changes."""
         if name.startswith(MORE):
             self._more_done[stage] += unit.stop - unit.start
@@ -192,8 +195,6 @@ class RunningCalibration(Running):
     @property
     def _recording(self) -> xr.Dataset | None:
         """The recording; None where the run holds none that can be read, or not yet."""
-        from driftwalk.record import load
-
         if self._loaded is None:
             with contextlib.suppress(DriftwalkError, OSError):
                 path = run_file(self._folder, "recording.nc")
@@ -203,8 +204,6 @@ class RunningCalibration(Running):
     @property
     def _recorded(self) -> RecordedSteps | None:
         """The steps of the recording, once it is there."""
-        from driftwalk.viewer.watch.recording_steps import recorded_steps
-
         if self._steps is None and self._recording is not None:
             with contextlib.suppress(DriftwalkError):
                 self._steps = recorded_steps(self._recording, self._study, body=self._body)
@@ -213,10 +212,6 @@ class RunningCalibration(Running):
     @property
     def _made_from(self) -> list[Section]:
         """The sections on the recording and on the flow, once they are there."""
-        from driftwalk.flow import load_flow
-        from driftwalk.page.sections.flow import flow_section
-        from driftwalk.page.sections.recording import trajectory_section
-
         if "recording" not in self._still and self._recording is not None:
             self._still["recording"] = trajectory_section(self._recording, body=self._body)
         if "flow" not in self._still:
@@ -275,18 +270,13 @@ class RunningCalibration(Running):
 
     def _bootstrap_section(self) -> Section:
         units = sorted(self._bootstrap, key=lambda unit: unit.start)
-        estimates = {
-            f"bootstrap_{one.name}": (
-                "bootstrap",
-                one.to_value(
-                    np.concatenate([unit.arrays[one.name] for unit in units] or [np.empty(0)])
-                ),
-            )
-            for one in self._parameters
-        }
-        section = bootstrap_section(self._dataset().assign(estimates))
+        found = self._dataset()
+        for one in self._parameters:
+            values = np.concatenate([unit.arrays[one.name] for unit in units] or [np.empty(0)])
+            found[f"bootstrap_{one.name}"] = ("bootstrap", one.to_value(values))
         return {
-            **section,
+            **bootstrap_section(found),
+            "id": "bootstrap",
             "title": "Bootstrap",
             "note": "Estimates from recordings that were simulated at the optimum: how far they "
             "scatter is how well the parameters are known.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,16 +14,14 @@ from driftwalk.core.progress import ignore_progress
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.text_files import path_inside, text_of_name
 from driftwalk.page.html import page_frame
-from driftwalk.page.parts import empty_section
+from driftwalk.page.parts import Section, empty_section
 from driftwalk.schema.runs import RUN_KINDS, load_maker
 from driftwalk.schema.runs.contents import holds_run
 from driftwalk.viewer.hub import Content, Publish, Source
-from driftwalk.viewer.watch.shards import RunReader, quiet_time
+from driftwalk.viewer.watch.shards import FinishedUnit, RunReader, quiet_time
 
 SPANS: Final = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))
 """Units in which that is said, each from two of it on; the last from one."""
-
-Section = dict[str, Any]
 
 
 NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
@@ -46,6 +44,9 @@ class Running:
         Everything that determines its numbers.
     """
 
+    _sweeps: Container[str] | None = None
+    """Names of the sweeps that are read, None for all."""
+
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
         self._reader = RunReader(folder)
         self._done = 0
@@ -53,9 +54,15 @@ class Running:
         self.title = "A run under way" if kind is None else kind.under_way
 
     def look(self) -> list[Section]:
-        """Read what is new, and return the sections that it changed."""
-        self._done += sum(1 for _ in self._reader.new_units())
-        return []
+        """Read what is new, and return the sections that it may have changed."""
+        units = list(self._reader.new_units(self._sweeps))
+        for name, unit in units:
+            self._take(name, unit)
+        return self.sections() if units else []
+
+    def _take(self, name: str, unit: FinishedUnit) -> None:  # noqa: ARG002
+        """Take a finished unit of a sweep."""
+        self._done += 1
 
     def sections(self) -> list[Section]:
         """Return all sections as they are now."""
@@ -187,7 +194,9 @@ class RunSource(Source):
         if _ids(page) != _ids(before):
             return [{"type": "page", "page": page}]
         same = page["state"] == before["state"]
-        sections: list[Content] = [{"type": "section", "section": one} for one in changed]
+        sections: list[Content] = [
+            {"type": "section", "section": one} for one in changed if one not in before["sections"]
+        ]
         return sections + ([] if same else [{"type": "state", "state": page["state"]}])
 
     def _page_of(self, running: Running) -> dict[str, Any]:

@@ -104,12 +104,11 @@ class RunReader:
     def look(self) -> None:
         """Find the sweeps that have begun since the last call."""
         try:
-            folders = [
-                path
+            began = {
+                path: (path / SPECIFICATION_FILE).stat().st_mtime_ns
                 for path in (self._run / SHARD_FOLDER).iterdir()
                 if path.is_dir() and path_inside(self._run, f"{SHARD_FOLDER}/{path.name}")
-            ]
-            began = {path: (path / SPECIFICATION_FILE).stat().st_mtime_ns for path in folders}
+            }
         except OSError:
             # Between two steps of the run a folder may have no specification yet, or be gone.
             return
