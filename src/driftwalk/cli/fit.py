@@ -10,7 +10,7 @@ from driftwalk.cli.inputs.model_source import load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared_types import Json, Overwrite, argument, flow_of_run, option
+from driftwalk.cli.options.shared_types import Json, Overwrite, argument, flow_option, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result
@@ -43,11 +43,8 @@ def fit(
     how: RecordingOptions,
     flow: Annotated[
         Path | None,
-        option(
-            "--flow FILE",
-            "Flow that was measured, as by PIV, steady or a series: the prior of the fitted flow.",
-            callback=flow_of_run,
-            show_default=False,
+        flow_option(
+            "Flow that was measured, as by PIV, steady or a series: the prior of the fitted flow."
         ),
     ] = None,
     start: Annotated[
@@ -56,7 +53,6 @@ def fit(
             "--from s|RUN",
             "First time to keep; or, for glued blocks (--body-shape xx), the finished fit of one "
             "block in the same water.",
-            show_default=False,
         ),
     ] = None,
     interaction: Annotated[

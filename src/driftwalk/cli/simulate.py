@@ -11,7 +11,7 @@ from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_s
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.model import KnownModel, ModelName, ParameterValues, known_model
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared_types import BodyOfLike, Json, Replace, Run, flow_of_run, option
+from driftwalk.cli.options.shared_types import BodyOfLike, Json, Replace, Run, flow_option, option
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -61,11 +61,9 @@ def simulate(
     run: Run = None,
     flow: Annotated[
         Path | None,
-        option(
-            "--flow FILE",
+        flow_option(
             "Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
-            "For the block, and for a --model that uses it.",
-            callback=flow_of_run,
+            "For the block, and for a --model that uses it."
         ),
     ] = None,
     model: ModelName = None,

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from driftwalk.cli.inputs.model_source import ModelSource, load_flow_for, open_source
-from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.model import (
     KnownModel,
@@ -119,6 +118,7 @@ Noise = Literal["estimated", "known"]
 
 
 # What --threads counts depends on the model here: it has a text of its own.
+@study_app.command(cls=HelpCommand)
 @with_options(RunOptions, "out", "cluster", "cluster_options", "overwrite", "json")
 @with_study_options(
     RECOVER_KEYS,
@@ -314,6 +314,3 @@ def _require_stated(path: Path) -> None:
                 f"{path}: the truth lacks [{section}] {key}: give the true value, a "
                 "fitted one or a guess"
             )
-
-
-study_app.command("recover", cls=HelpCommand, help=paragraphs(recover.__doc__ or ""))(recover)

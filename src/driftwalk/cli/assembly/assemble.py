@@ -27,7 +27,6 @@ def assemble(
             "--from RUN",
             "Fit of glued blocks, or of free blocks in one recording: drag of hidden faces, shared "
             "stirring.",
-            show_default=False,
         ),
     ] = None,
     binding: Annotated[
@@ -36,7 +35,6 @@ def assemble(
             "--binding FILE",
             "Kinds of blocks, types of their faces, and which of them latch, as a TOML table.",
             panel=PANEL,
-            show_default=False,
         ),
     ] = None,
     film: Annotated[str, option("--film gif|mp4|none", "Film of the first run.")] = "gif",

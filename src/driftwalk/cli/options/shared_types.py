@@ -47,14 +47,7 @@ def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
     return parse
 
 
-def option(
-    names: str,
-    help: str,
-    *,
-    panel: str | None = None,
-    unit: str = "",
-    **more: Any,
-) -> Any:
+def option(names: str, help: str, *, panel: str | None = None, unit: str = "", **more: Any) -> Any:
     """Return the declaration of an option; with a unit, of one that takes a quantity.
 
     The names stand with the placeholder of the value as in the help: ``"--out -o FILE"``.
@@ -87,8 +80,12 @@ def parse_scale(text: Any) -> Any:
     return quantity_parser("m")(text)
 
 
-def flow_of_run(path: Path | None) -> Path | None:
-    """Return the flow field in a run directory; any other path as it is."""
+def flow_option(help: str) -> Any:
+    """Return the declaration of an option for a flow field, or for the run that holds it."""
+    return option("--flow FILE", help, callback=_flow_of_run)
+
+
+def _flow_of_run(path: Path | None) -> Path | None:
     if path is None or not path.is_dir():
         return path
     from driftwalk.core.files.run_layout import run_file
@@ -114,13 +111,7 @@ StudyFile = Annotated[
     option("--study FILE", "Study file with the parameters (see: driftwalk study new)."),
 ]
 FlowFile = Annotated[
-    Path | None,
-    option(
-        "--flow FILE",
-        "Flow field to use, or the run directory that holds it.",
-        callback=flow_of_run,
-        show_default=False,
-    ),
+    Path | None, flow_option("Flow field to use, or the run directory that holds it.")
 ]
 FrameInterval = Annotated[
     float | None,
@@ -137,7 +128,6 @@ FlowVariables = Annotated[
         "--flow-variables u=NAME,v=NAME",
         "Variables of a flow field in NetCDF: u, v, x, y, time, mask.",
         panel=READING,
-        show_default=False,
     ),
 ]
 Json = Annotated[bool, option("--json", "Print the result as JSON on stdout.")]

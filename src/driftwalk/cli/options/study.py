@@ -171,7 +171,6 @@ def study_option(name: str, keys: Mapping[str, str] = STUDY_KEYS) -> Any:
         min=quantity.ge if quantity is not None and is_whole else None,
         parser=None if quantity is None or plain else quantity_parser(quantity.unit, *key.words),
         rich_help_panel=PANELS.get(keys[name].partition(".")[0], PANEL),
-        show_default=False,
     )
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.shared_types import PANEL, Json, Replace, argument, option
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
@@ -23,6 +22,7 @@ _POOR_PX: Final = 1.0
 camera_app = typer.Typer(add_completion=False, cls=HelpGroup)
 
 
+@camera_app.command(cls=HelpCommand)
 def calibrate(
     images: Annotated[
         list[Path],
@@ -108,11 +108,6 @@ def _read(path: Path) -> Any:
     if not path.is_file():
         raise FormatError("no such image", path=path)
     return read_image(path)
-
-
-camera_app.command("calibrate", cls=HelpCommand, help=paragraphs(calibrate.__doc__ or ""))(
-    calibrate
-)
 
 
 @camera_app.callback()
