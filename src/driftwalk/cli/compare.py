@@ -96,7 +96,8 @@ def compare(
     summary = summarise(result)
     # What `compare` warned of in passing stands in the result as well, there with the motion.
     noted = " ".join(summary["warnings"])
-    summary["warnings"] += [text for text in map(_text, caught) if text not in noted]
+    said = [str(one.message) for one in caught]
+    summary["warnings"] += [text for text in said if text not in noted]
     if json:
         print_json({"a": a, "b": b, **summary})
         return
@@ -124,10 +125,6 @@ def summarise(result: xr.Dataset) -> dict[str, Any]:
         **motions,
         "warnings": json_module.loads(result.attrs["warnings"]),
     }
-
-
-def _text(caught: warnings.WarningMessage) -> str:
-    return str(caught.message)
 
 
 def _print(summary: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note, print_row
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
-from driftwalk.export import TARGETS, Source, Verification, export_run, target_named
+from driftwalk.export import TARGETS, Source, export_run, target_named
 
 
 def export(
@@ -84,7 +84,7 @@ def export(
                 "to": to,
                 "files": [path.relative_to(out).as_posix() for path in files],
                 "notes": notes,
-                "verification": None if outcome is None else _facts(outcome),
+                "verification": outcome and {"passed": outcome.passed, **outcome.numbers},
             }
         )
     else:
@@ -92,13 +92,7 @@ def export(
             print_note(f"note: {note}")
         print_row("folder", f"{out}: {target.gives}")
         print_row("begin with", out / "README.md")
-        for line in () if outcome is None else outcome.lines:
-            print_row(
-                "verified" if outcome is not None and outcome.passed else "NOT VERIFIED", line
-            )
+        for line in outcome.lines if outcome else ():
+            print_row("verified" if outcome.passed else "NOT VERIFIED", line)
         print(f"next: read {out / 'README.md'}", file=sys.stderr)
     return 0 if outcome is None or outcome.passed else 1
-
-
-def _facts(outcome: Verification) -> dict[str, float | int | bool]:
-    return {"passed": outcome.passed, **outcome.numbers}

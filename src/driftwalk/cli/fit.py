@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from driftwalk.cli.inputs.model_source import load_flow_for
+from driftwalk.cli.inputs.model_source import given_files, load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.recording import RecordingOptions
@@ -100,8 +100,7 @@ def fit(
     read = read_for_run(recordings, given, how, before=before)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     fitted = earlier and earlier / run_kind("fit").file
-    files = {"study": given.file, "flow": flow, "earlier": fitted}
-    inputs |= {role: path for role, path in files.items() if path}
+    inputs |= given_files(study=given.file, flow=flow, earlier=fitted)
     field = None if flow is None else load_flow_for(flow, read.study)
     effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))
     source = "recording" if earlier is None else str(earlier)

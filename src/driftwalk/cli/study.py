@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from driftwalk.cli.inputs.model_source import ModelSource, load_flow_for, open_source
+from driftwalk.cli.inputs.model_source import ModelSource, given_files, load_flow_for, open_source
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.model import (
     KnownModel,
@@ -236,9 +236,9 @@ def _of_model(
     else:
         field, flow_file = _named_flow(study, given)
     parameters = None if found is None else found.file
-    inputs = {"truth": given.file, "parameters": parameters, "like": like, "flow": flow_file}
+    inputs = given_files(truth=given.file, parameters=parameters, like=like, flow=flow_file)
     method = ModelRecovery(study, chosen.model, chosen.values, field, recording, body, noise)
-    return method, _files(inputs)
+    return method, inputs
 
 
 def _of_block(source: ModelSource) -> tuple[FitRecovery, dict[str, Path]]:
@@ -257,7 +257,7 @@ def _of_block(source: ModelSource) -> tuple[FitRecovery, dict[str, Path]]:
     study = given.study()
     _require_stated(given.file)
     field, flow_file = _named_flow(study, given)
-    return FitRecovery(study, field), _files({"truth": given.file, "flow": flow_file})
+    return FitRecovery(study, field), given_files(truth=given.file, flow=flow_file)
 
 
 def _of_run(
@@ -277,7 +277,7 @@ def _of_run(
         print_warnings([lacks])
         return study, mean, found.inputs
     field, flow_file = _named_flow(study, given)
-    return study, field, {**found.inputs, **_files({"flow": flow_file})}
+    return study, field, found.inputs | given_files(flow=flow_file)
 
 
 def _named_flow(study: Study, given: StudyOptions) -> tuple[xr.Dataset | None, Path | None]:
@@ -289,11 +289,6 @@ def _named_flow(study: Study, given: StudyOptions) -> tuple[xr.Dataset | None, P
     if given.file is not None and RECOVER_KEYS["flow"] not in given.overrides:
         path = given.file.parent / named
     return load_flow_for(path, study), path
-
-
-def _files(roles: dict[str, Path | None]) -> dict[str, Path]:
-    """Return the files that were given, by their role."""
-    return {role: path for role, path in roles.items() if path is not None}
 
 
 def _refuse(given: StudyOptions, keys: Sequence[str], why: str) -> None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -135,18 +136,15 @@ def with_study_options(
     file : {"--study", "none"}
         Whether the command takes a study file by that option.
     """
-    parts = {name: _part(name, keys) for name in names}
+    parts = {"study": Part(StudyFile, None)} if file == "--study" else {}
+    parts |= {name: _part(name, keys) for name in names}
 
     def make(values: dict[str, Any]) -> StudyOptions:
         path = values.pop("study", None)
         given = {name: _items(value) for name, value in values.items()}
         return StudyOptions(path, study_overrides(keys=keys, **given), keys)
 
-    def decorate(function: Command) -> Command:
-        before = {"study": Part(StudyFile, None)} if file == "--study" else {}
-        return spread(function, StudyOptions, {**before, **parts}, make)
-
-    return decorate
+    return partial(spread, kind=StudyOptions, parts=parts, make=make)
 
 
 def study_option(name: str, keys: Mapping[str, str] = STUDY_KEYS) -> Any:
