@@ -131,8 +131,7 @@ def _of_model(
     from driftwalk.conditions import study_for
     from driftwalk.viewer import ModelPlaySource
 
-    if "assembly.blocks" in source.given.overrides:
-        raise InputError("--blocks: the page of a --model has a slider for its bodies")
+    source.given.refuse(["assembly.blocks"], "the page of a --model has a slider for its bodies")
     chosen, found, beside = source.study(), source.found, None
     if found is not None:
         beside, body = _of_run(found, recording, chosen, body)

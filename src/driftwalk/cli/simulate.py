@@ -12,7 +12,7 @@ from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.model import KnownModel, ModelName, ParameterValues, known_model
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.shared_types import BodyOfLike, Json, Replace, Run, flow_option, option
-from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
+from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
     print_next,
@@ -42,16 +42,8 @@ OF_THE_BLOCK: Final = (
 
 @with_study_options(
     STUDY_KEYS,
-    *(
-        "tank_diameter",
-        "body_shape",
-        "side",
-        "mass",
-        "depth",
-        "drag_coefficient",
-        "force_std",
-        "force_interval",
-    ),
+    *("tank_diameter", "body_shape", "side", "mass", "depth"),
+    *("drag_coefficient", "force_std", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step", "duration", "sample_rate"),
     *("position_noise", "orientation_noise", "replicates", "seed", "flow_repeat", "flow_start"),
 )
@@ -156,11 +148,10 @@ def _of_block(
         )
     else:
         field = load_flow(flow)
-    if recording is not None:
-        chosen = study_for([recording], chosen, body=body)
     if recording is None:
         result = run(chosen, field, backend="reference" if backend == "reference" else "cpu")
     else:
+        chosen = study_for([recording], chosen, body=body)
         result = simulate_like(chosen, field, recording)
     # What was refused needs no such words.
     print_warnings([] if found is None else found.warnings)
@@ -187,7 +178,9 @@ def _of_model(
     from driftwalk.conditions import study_for
     from driftwalk.motion import simulate_motion
 
-    _refuse_block(source.given)
+    of_block = ("block.", "forces.", "simulation.time_step_s")
+    about_it = [key for key in source.given.overrides if key.startswith(of_block)]
+    source.given.refuse(about_it, "about the block, which --model replaces; leave it out")
     chosen = source.study()
     if recording is not None:
         chosen = study_for([recording], chosen, body=body)
@@ -198,15 +191,6 @@ def _of_model(
     _say_what(chosen, source, about="tank")
     print_warnings(known.warnings)
     return result
-
-
-def _refuse_block(given: StudyOptions) -> None:
-    """Refuse options about the block and its force, which another model does not have."""
-    of_block = [key for key in given.overrides if key.startswith(("block.", "forces."))]
-    of_block += [key for key in given.overrides if key == "simulation.time_step_s"]
-    if of_block:
-        names = ", ".join(option_name(key, keys=given.keys) for key in of_block)
-        raise InputError(f"{names}: about the block, which --model replaces; leave it out")
 
 
 def _in_words(facts: dict[str, Any]) -> str:

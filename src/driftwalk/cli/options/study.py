@@ -12,7 +12,7 @@ An option that is not given leaves the study file's value as it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -115,6 +115,18 @@ class StudyOptions:
         except ConfigurationError as error:
             given = [option_name(key, keys=self.keys) for key in self.overrides]
             raise ConfigurationError(f"{', '.join(given)} over {base}: {error}") from error
+
+    def refuse(self, keys: Iterable[str], why: str) -> None:
+        """Refuse options that set one of these keys of the study.
+
+        Raises
+        ------
+        ConfigurationError
+            Names the options.
+        """
+        names = [option_name(key, keys=self.keys) for key in keys if key in self.overrides]
+        if names:
+            raise ConfigurationError(f"{', '.join(names)}: {why}")
 
     def and_also(self, overrides: Mapping[str, Any], *, keys: Mapping[str, str]) -> StudyOptions:
         """Return these options and more of them, with the names of the further ones."""

@@ -107,12 +107,7 @@ def info(
     from driftwalk.cli.inputs.recordings import words_to_fit
     from driftwalk.record import describe
 
-    field = read_flow_file(
-        recording,
-        how,
-        frame_interval=frame_interval,
-        variables=flow_variables,
-    )
+    field = read_flow_file(recording, how, frame_interval=frame_interval, variables=flow_variables)
     if field is not None:
         _print_field(describe_field(field), json=json)
         return

@@ -191,7 +191,7 @@ class TrackingRun:
         KeyboardInterrupt
             When a file was interrupted; a camera's recording ends that way.
         """
-        from driftwalk.track import frame_count, open_source
+        from driftwalk.track import OverlayWriter, frame_count, open_source
 
         total = frame_count(self.options.source) or 0
         source = open_source(self.options.source, rate=self.options.fps)
@@ -201,7 +201,10 @@ class TrackingRun:
             open_things.callback(source.close)
             open_things.enter_context(_termination_as_interrupt())
             live = LiveOutputs(self.options, self.parts, self.source_name, open_things)
-            overlay = self._open_overlay(open_things)
+            overlay = None
+            if self.options.overlay is not None:
+                overlay = OverlayWriter(self.options.overlay)
+                open_things.callback(overlay.close)
             progress = open_things.enter_context(ProgressReporter("track"))
             try:
                 for frame in source:
@@ -209,7 +212,8 @@ class TrackingRun:
                     self._take(frame, source.waited_s, live, overlay)
                     dropped = self._source_counts["dropped"]
                     tell_progress(progress, frame.index + 1, total, dropped)
-                    self._save_now_and_then()
+                    if clock.monotonic() - self._saved >= self._pause:
+                        self._save(complete=False)
                 self.interrupted = source.interrupted
             except KeyboardInterrupt:
                 self.interrupted = f"interrupted after {self.frames} frames"
@@ -305,19 +309,6 @@ class TrackingRun:
             self._left_out.add(name)
             print_note(f"warning: {name} is one more than --bodies; joins are reported without it")
         return {name: pose for name, pose in seen.items() if name in self._names}
-
-    def _open_overlay(self, open_things: contextlib.ExitStack) -> OverlayWriter | None:
-        from driftwalk.track import OverlayWriter
-
-        if self.options.overlay is None:
-            return None
-        writer = OverlayWriter(self.options.overlay)
-        open_things.callback(writer.close)
-        return writer
-
-    def _save_now_and_then(self) -> None:
-        if clock.monotonic() - self._saved >= self._pause:
-            self._save(complete=False)
 
     def _save(self, *, complete: bool) -> None:
         from driftwalk.record import save_trajectory
