@@ -179,12 +179,9 @@ def checks_off(replicates: Floats, recorded: Floats) -> Bools:
     """Return which facts of a recording are far beyond all replicates, shape (checks,)."""
     low, high = replicates.min(axis=0), replicates.max(axis=0)
     share = np.array([name.endswith("_share") for name in CHECKS])
-    lowest = np.where(
-        share, low - HELD_OUT_VERDICT.most_share_apart, low / HELD_OUT_VERDICT.most_ratio
-    )
-    highest = np.where(
-        share, high + HELD_OUT_VERDICT.most_share_apart, high * HELD_OUT_VERDICT.most_ratio
-    )
+    apart, ratio = HELD_OUT_VERDICT.most_share_apart, HELD_OUT_VERDICT.most_ratio
+    lowest = np.where(share, low - apart, low / ratio)
+    highest = np.where(share, high + apart, high * ratio)
     with np.errstate(invalid="ignore"):
         near = (lowest <= recorded) & (recorded <= highest)
     return np.asarray(np.isfinite(recorded) & ~near)

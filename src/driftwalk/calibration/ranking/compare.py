@@ -56,6 +56,9 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
+Tell = Callable[[int, int, str], None]
+
+
 def runs_in_threads(entry: Candidate) -> bool:
     """Return whether several threads may simulate a model: of a user's own that is unknown."""
     return entry.baseline or isinstance(entry.model, BlockModel | ParticleModel)
@@ -86,8 +89,10 @@ class SearchProgress:
         Of the models.
     costs : sequence of int
         Settings that each simulates at most.
+    done : list of int
+        Settings of each that are done already.
     tell : callable
-        Called with the settings done, in all, and the models under way.
+        Called with the settings done, all of them, and the models under way.
 
     Attributes
     ----------
@@ -96,18 +101,12 @@ class SearchProgress:
     """
 
     def __init__(
-        self, names: Sequence[str], costs: Sequence[int], tell: Callable[[int, str], None]
+        self, names: Sequence[str], costs: Sequence[int], done: list[int], tell: Tell
     ) -> None:
-        self._names, self._costs, self._tell = names, costs, tell
-        self._done = [0] * len(names)
+        self._names, self._costs, self._done, self._tell = names, costs, done, tell
         self._under_way: set[int] = set()
         self._lock = Lock()
         self.cancellation = CancelOnError()
-
-    def finished(self, indices: Sequence[int]) -> None:
-        """Hear which models were searched before."""
-        for index in indices:
-            self._done[index] = self._costs[index]
 
     def __call__(self, index: int, done: int) -> None:
         """Hear how many settings of a model are done; all of them when it is finished."""
@@ -119,10 +118,9 @@ class SearchProgress:
             else:
                 self._under_way.discard(index)
             names = ", ".join(self._names[k] for k in sorted(self._under_way))
-            self._tell(sum(self._done), names or self._names[index])
+            self._tell(sum(self._done), sum(self._costs), names or self._names[index])
 
 
-Tell = Callable[[int, int, str], None]
 Finished = Callable[[str, float, float, int], None]
 """Hears of a model that was judged: its name, its score, the standard error of that, and how many
 models there are."""
@@ -270,16 +268,14 @@ class Stages:
 
         A user's model may fail: that is said before the others take minutes.
         """
-        entries = self.work.entries
+        entries, costs = self.work.entries, self.work.costs()
+        missing = [unit.start for unit in retained.missing(units)]
         together = SearchProgress(
             [one.model.name for one in entries],
-            self.work.costs(),
-            lambda done, names: self.staged_progress.stage("models")(
-                done, sum(self.work.costs()), names
-            ),
+            costs,
+            [0 if index in missing else cost for index, cost in enumerate(costs)],
+            self.staged_progress.stage("models"),
         )
-        missing = [unit.start for unit in retained.missing(units)]
-        together.finished([unit.start for unit in units if unit.start not in missing])
         threaded = (
             [k for k in missing if runs_in_threads(entries[k])] if self.pool is not None else []
         )
