@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import TracebackType
 from typing import Any, Self, TextIO
 
 from driftwalk.core.progress import WHOLE
@@ -67,51 +66,39 @@ class ProgressReporter:
             self._start_bar()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         if self._bar is not None:
             self._bar.stop()
 
     @property
-    def left_s(self) -> float | None:
-        """The time left [s], from the work done so far; None while too little is done to say.
-
-        Work of an earlier run that was killed does not count: it took no time now.
-        """
-        return None if self._ends is None else max(self._ends - self._clock(), 0.0)
-
-    @property
     def left(self) -> str:
-        """The time left in words; empty where it is unknown, or nothing is left."""
+        """The time left in words, from the work done so far; empty where nothing is left.
+
+        It is also empty while too little is done to say. Work of an earlier run that was killed
+        does not count: it took no time now.
+        """
         from driftwalk.schema.answers.parts import duration_text
 
-        return f"{duration_text(self.left_s)} left" if self.left_s else ""
+        left_s = 0.0 if self._ends is None else self._ends - self._clock()
+        return f"{duration_text(left_s)} left" if left_s > 0.0 else ""
 
     def __call__(self, done: int, total: int, text: str = "") -> None:
         """Say that `done` of `total` parts are complete, and what is under way."""
         now = self._clock()
         self._judge(done / total if total > 0 else 0.0, now)
         text = ", ".join(part for part in (text, self.remark()) if part)
+        count = _count(done, total)
         if self._bar is not None:
             title = f"{self._title} {text}".rstrip()
             self._bar.update(
-                self._task,
-                completed=done,
-                total=total,
-                description=title,
-                count=_count(done, total),
+                self._task, completed=done, total=total, description=title, count=count
             )
             return
         if now - self._last_line >= self._seconds_between_lines:
             self._last_line = now
             left = f", {self.left}" if self.left else ""
             remark = f": {text}" if text else ""
-            line = f"{self._title}: {_count(done, total)}{left}{remark}"
-            print(line, file=self._stream, flush=True)
+            print(f"{self._title}: {count}{left}{remark}", file=self._stream, flush=True)
 
     def _judge(self, share: float, now: float) -> None:
         """Judge when the work will end."""
