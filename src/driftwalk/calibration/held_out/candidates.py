@@ -220,11 +220,10 @@ def resampling_baselines(motion: RecordedMotion) -> list[Candidate]:
     (steps,), _ = interleaved([motion.steps], duration=motion.duration)
     interval = motion.plan.short.step_interval
     hidden = fit_hidden_markov_model(runs_of(steps, interval))
+    walk = HiddenMarkovWalk(hidden, interval)
     return [
         Candidate(ResampledSteps(steps.points, interval), motion.like, (), 0, baseline=True),
-        Candidate(
-            HiddenMarkovWalk(hidden, interval), motion.like, (), hidden.parameters, baseline=True
-        ),
+        Candidate(walk, motion.like, (), hidden.parameters, baseline=True),
     ]
 
 

@@ -207,26 +207,19 @@ class Stages:
         """
         if self.replicates < 2:
             return {}
-        shortlist = shortlist_models(self.work.entries, held_out)
+        entries = self.work.entries
+        shortlist = shortlist_models(entries, held_out)
         found: dict[int, Evidence] = {}
         for number, index in enumerate(shortlist.models):
-            numbers = [
-                self.work.entries[k].numbers for k, one in found.items() if one.discrepancy.usual
-            ]
-            if number >= shortlist.tied and min(numbers, default=math.inf) <= (
-                self.work.entries[index].numbers
-            ):
-                continue
-            planned = max(shortlist.tied, 1)
-            found[index] = self._matched(len(found), index, held_out[index].point, planned)
-        walks = [
-            index
-            for index, entry in enumerate(self.work.entries)
-            if entry.baseline and not held_out_differences(held_out[index], self.work.motion)
-        ]
+            numbers = [entries[k].numbers for k, one in found.items() if one.discrepancy.usual]
+            is_simplest = entries[index].numbers < min(numbers, default=math.inf)
+            if number < shortlist.tied or is_simplest:
+                planned = max(shortlist.tied, 1)
+                found[index] = self._matched(len(found), index, held_out[index].point, planned)
         if any(one.discrepancy.usual for one in found.values()):
-            for index in walks:
-                found[index] = self._matched(len(found), index, np.empty(0), len(found) + 1)
+            for index, entry in enumerate(entries):
+                if entry.baseline and not held_out_differences(held_out[index], self.work.motion):
+                    found[index] = self._matched(len(found), index, np.empty(0), len(found) + 1)
         return found
 
     @cached_property
@@ -276,19 +269,14 @@ class Stages:
             [0 if index in missing else cost for index, cost in enumerate(costs)],
             self.staged_progress.stage("models"),
         )
-        threaded = (
-            [k for k in missing if runs_in_threads(entries[k])] if self.pool is not None else []
-        )
+        threaded = [k for k in missing if self.pool is not None and runs_in_threads(entries[k])]
         others = [k for k in missing if k not in threaded]
         alone = replace(self.work, within=together)
         share = max(len(threaded), 1)
-        shared = replace(
-            alone,
-            entries=[
-                one._replace(like=replace(one.like, threads=max(one.like.threads // share, 1)))
-                for one in entries
-            ],
-        )
+        sharing = [
+            one._replace(like=replace(one.like, threads=max(one.like.threads // share, 1)))
+            for one in entries
+        ]
         # The block takes more steps of time than the others, which take the longer the more they
         # have to search: so none is left over for one processor at the end.
         threaded.sort(
@@ -299,6 +287,7 @@ class Stages:
                 run_sweep(alone, [units[k] for k in others], store=retained, progress=look)
             if threaded:
                 first = [units[k] for k in threaded]
+                shared = replace(alone, entries=sharing)
                 run_sweep(shared, first, store=retained, executor=self.pool, progress=look)
         return collect(retained, units)
 
@@ -311,9 +300,8 @@ class Stages:
             self.staged_progress.stage("models")(done, total)
             look(done, total)
 
-        return run_sweep(
-            self.work, units, store=retained, executor=self.executor, progress=finished
-        )
+        executor = self.executor
+        return run_sweep(self.work, units, store=retained, executor=executor, progress=finished)
 
     def _matched(self, number: int, index: int, answer: np.ndarray, planned: int) -> Evidence:
         """Match the summaries with one model: units of 16 settings, the rest in this process.

@@ -210,7 +210,7 @@ def estimate_evidence(
 ) -> Evidence:
     """Match the summaries of a recording with a model, and say how well that went."""
     parameters, replicates = len(entry.ranges), motion.replicates
-    objective = SummaryObjective(
+    objective = _Blurred(
         even_blocks(entry, motion),
         motion,
         store=store,
@@ -218,11 +218,10 @@ def estimate_evidence(
         tell=tell,
         most=most_settings(parameters, replicates),
     )
-    simulate = _Blurred(objective, motion.seed)
     setting, log_volume = np.empty(0), 0.0
     if parameters:
         optima = find_optima(
-            simulate,
+            objective,
             parameters,
             lambda: answer[None],
             order=label_order(entry),
@@ -233,7 +232,7 @@ def estimate_evidence(
         best = optima[0].solution
         setting, log_volume = rounded(np.clip(best.setting, 0.0, 1.0)), best.log_volume
     found = synthetic_likelihood_at(
-        lambda settings: simulate(settings)[:, 0], objective.recorded[0], setting, replicates
+        lambda settings: objective(settings)[:, 0], objective.recorded[0], setting, replicates
     )
     evidence = Evidence(
         discrepancy=Discrepancy.of(found.discrepancy, found.own_discrepancies),
@@ -252,15 +251,11 @@ def estimate_evidence(
     )
 
 
-class _Blurred:
-    """Simulates and summarises as an objective does, and adds its own noise."""
-
-    def __init__(self, objective: SummaryObjective, seed: int) -> None:
-        self.recorded = objective.recorded
-        self._objective, self._seed = objective, seed
+class _Blurred(SummaryObjective):
+    """Adds noise to the summaries of simulated worlds."""
 
     def __call__(self, settings: Floats, *, parts: int = 1) -> Floats:
         """Return the summaries of settings, shape (settings, parts, summaries)."""
-        random = np.random.default_rng([self._seed, self._objective.done])
-        found = self._objective(settings, parts=parts)
+        random = np.random.default_rng([self.worlds.seed, self.done])
+        found = super().__call__(settings, parts=parts)
         return found + EVIDENCE.blur * random.standard_normal(found.shape)

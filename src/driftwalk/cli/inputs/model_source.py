@@ -365,14 +365,12 @@ class ModelSource:
 
     def study(self) -> Study:
         """Return the study of the run, where it has one, with the options over it."""
-        if self.found is None:
-            return self.given.study()
-        if self.found_block:
+        if self.found is not None and self.found_block:
             own = self.found.block_study()
-        elif self.given.file is not None or not self.found.has_study:
-            return self.given.study()
-        else:
+        elif self.found is not None and self.given.file is None and self.found.has_study:
             own = self.found.study()
+        else:
+            return self.given.study()
         return self.given.over(own, base=f"the study of {self.folder}")
 
     def flow_for(self, model: MotionModel, study: Study, flow: Path | None) -> xr.Dataset | None:
