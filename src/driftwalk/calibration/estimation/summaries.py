@@ -240,12 +240,8 @@ def _changes(one: Series) -> Numbers:
     change = np.where(pair, one.log_length[1:] - one.log_length[:-1], 0.0)
     product = np.maximum(one.length[1:] * one.length[:-1], 1e-300)
     cos = (one.dx[1:] * one.dx[:-1] + one.dy[1:] * one.dy[:-1]) / product
-    kinds = (
-        change > SUMMARIES.faster,
-        change < -SUMMARIES.faster,
-        np.abs(change) < SUMMARIES.steady,
-    )
-    for kind in kinds:
+    faster = SUMMARIES.faster
+    for kind in (change > faster, change < -faster, np.abs(change) < SUMMARIES.steady):
         yield float((kind & pair).sum()) / max(float(pair.sum()), 1.0)
         yield _mean(cos, kind & pair)
     enough = np.count_nonzero(pair) >= SUMMARIES.fewest

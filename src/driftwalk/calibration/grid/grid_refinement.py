@@ -107,13 +107,8 @@ def locate_minimum(maps: MapSimulator, window: Window, limits: Window) -> Refine
 
 def refined(found: Map, window: Window, limits: Window) -> RefinedMap:
     """Return a map with its surface and the extent of its plausible settings."""
-    widths = tuple(
-        max(
-            REFINEMENT.bandwidth_steps * _step(axis),
-            REFINEMENT.bandwidth_share * float(np.ptp(axis)),
-        )
-        for axis in found.axes
-    )
+    steps, share = REFINEMENT.bandwidth_steps, REFINEMENT.bandwidth_share
+    widths = tuple(max(steps * _step(axis), share * float(np.ptp(axis))) for axis in found.axes)
     energy_score = smooth_energy_score(found, widths)
     return RefinedMap(found, energy_score, widths, window, _plausible(energy_score, limits))
 

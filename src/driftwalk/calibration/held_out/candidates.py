@@ -118,15 +118,11 @@ class HiddenMarkovWalk(Baseline):
         state[:, 0] = _chosen(begin[None], chance[:, 0])
         for k in range(1, count):
             state[:, k] = _chosen(moves[state[:, k - 1]], chance[:, k])
-        rows = zip(random.generators, state, strict=True)
-        drawn = [
-            (
-                one.gamma(walk.shape[row], walk.scale[row]),
-                one.vonmises(walk.direction[row], walk.concentration[row]),
-            )
-            for one, row in rows
-        ]
-        return np.array([length for length, _ in drawn]), np.array([turn for _, turn in drawn])
+        length, turn = np.empty((2, *state.shape))
+        for world, (one, row) in enumerate(zip(random.generators, state, strict=True)):
+            length[world] = one.gamma(walk.shape[row], walk.scale[row])
+            turn[world] = one.vonmises(walk.direction[row], walk.concentration[row])
+        return length, turn
 
 
 def runs_of(steps: Aspect, interval: float) -> list[Floats]:

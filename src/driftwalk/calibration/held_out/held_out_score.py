@@ -37,9 +37,9 @@ class HeldOutScore(NamedTuple):
     """The same without each of the odd blocks, shape (blocks / 2,)."""
     checks: Floats
     """Facts that are not fitted, of each world, shape (worlds, checks)."""
-    optimum_scores: Floats
+    optimum_scores: Floats = np.empty(0)
     """Scores at the ends of the searches."""
-    evaluations: int
+    evaluations: int = 0
 
     @property
     def score_std(self) -> float:
@@ -105,8 +105,6 @@ def score_setting(
             [float(part.overall(distances(part)).mean()) for part in motion.without_each_block]
         ),
         checks=np.array([motion.checks(x, y) for x, y in zip(seen.x, seen.y, strict=True)]),
-        optimum_scores=np.empty(0),
-        evaluations=0,
     )
 
 

@@ -226,7 +226,6 @@ def estimate_evidence(
             lambda: answer[None],
             order=label_order(entry),
             seed=motion.seed,
-            no_restart_above=EVIDENCE.give_up_above,
             give_up=EVIDENCE.give_up_above,
         )
         best = optima[0].solution
