@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.cli.options.shared_types import Json, Overwrite, Threads, option
+from driftwalk.cli.options.shared_types import Json, Overwrite, Threads, flag, optional
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.progress import ignore_progress
@@ -43,10 +43,8 @@ PAGE = "report.html"
 
 
 def demo(
-    out: Annotated[Path, option("--out -o DIR", "Directory of both runs.")] = Path("demo"),
-    quick: Annotated[
-        bool, option("--quick", "Search only a small part; takes seconds, not minutes.")
-    ] = False,
+    out: Path = optional("--out -o DIR", "Directory of both runs.", default=Path("demo")),
+    quick: bool = flag("--quick", "Search only a small part; takes seconds, not minutes."),
     threads: Threads = None,
     overwrite: Overwrite = False,
     json: Json = False,

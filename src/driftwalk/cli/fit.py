@@ -10,7 +10,15 @@ from driftwalk.cli.inputs.model_source import given_files, load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared_types import Json, Overwrite, argument, flow_option, option
+from driftwalk.cli.options.shared_types import (
+    Json,
+    Overwrite,
+    argument,
+    flag,
+    flow_of_run,
+    option,
+    optional,
+)
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result
@@ -41,40 +49,26 @@ def fit(
     out: Annotated[Path, option("--out -o DIR", "Run directory to make.")],
     given: StudyOptions,
     how: RecordingOptions,
-    flow: Annotated[
-        Path | None,
-        flow_option(
-            "Flow that was measured, as by PIV, steady or a series: the prior of the fitted flow."
-        ),
-    ] = None,
-    start: Annotated[
-        str | None,
-        option(
-            "--from s|RUN",
-            "First time to keep; or, for glued blocks (--body-shape xx), the finished fit of one "
-            "block in the same water.",
-        ),
-    ] = None,
-    interaction: Annotated[
-        bool,
-        option(
-            "--interaction",
-            "Fit all free bodies of the recording together, and say how far they share the force.",
-        ),
-    ] = False,
-    no_check: Annotated[
-        bool, option("--no-check", "Skip the check whether the model explains the recording.")
-    ] = False,
-    compare_laws: Annotated[
-        bool,
-        option(
-            "--compare-laws",
-            "Compare force laws by evidence and held out prediction (takes some eight fits).",
-        ),
-    ] = False,
-    wall: Annotated[
-        bool, option("--wall", "Estimate restitution and friction of the wall from the contacts.")
-    ] = False,
+    flow: Path | None = optional(
+        "--flow FILE",
+        "Flow that was measured, as by PIV, steady or a series: the prior of the fitted flow.",
+        callback=flow_of_run,
+    ),
+    start: str | None = optional(
+        "--from s|RUN",
+        "First time to keep; or, for glued blocks (--body-shape xx), the finished fit of one "
+        "block in the same water.",
+    ),
+    interaction: bool = flag(
+        "--interaction",
+        "Fit all free bodies of the recording together, and say how far they share the force.",
+    ),
+    no_check: bool = flag("--no-check", "Skip the check whether the model explains the recording."),
+    compare_laws: bool = flag(
+        "--compare-laws",
+        "Compare force laws by evidence and held out prediction (takes some eight fits).",
+    ),
+    wall: bool = flag("--wall", "Estimate restitution and friction of the wall from the contacts."),
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared_types import FlowVariables, FrameInterval, Json, Replace, option
+from driftwalk.cli.options.shared_types import (
+    FlowVariables,
+    FrameInterval,
+    Json,
+    Replace,
+    flag,
+    option,
+)
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -43,10 +50,9 @@ def flow(
     how: RecordingOptions,
     frame_interval: FrameInterval = None,
     flow_variables: FlowVariables = None,
-    tracers: Annotated[
-        bool,
-        option("--tracers", "The bodies are passive tracers: their tracks make one flow (PTV)."),
-    ] = False,
+    tracers: bool = flag(
+        "--tracers", "The bodies are passive tracers: their tracks make one flow (PTV)."
+    ),
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:

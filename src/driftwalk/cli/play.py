@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_source
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.model import KnownModel, ModelName, PlayedParameters, playable_model
-from driftwalk.cli.options.shared_types import FlowFile, Replace, Run, option
+from driftwalk.cli.options.shared_types import FlowFile, Replace, Run, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.cli.view import Host, Open, Port, show
@@ -40,23 +40,14 @@ def play(
     flow: FlowFile = None,
     model: ModelName = None,
     parameters: PlayedParameters = None,
-    recording: Annotated[
-        Path | None, option("--recording FILE", "Recording to compare the steps with.")
-    ] = None,
-    body: Annotated[str | None, option("--body", "Body of the recording.")] = None,
-    live: Annotated[
-        int | None,
-        option(
-            "--live PORT", "Port that publishes the tank as a tracker's stream; 0 for a free port."
-        ),
-    ] = None,
-    save: Annotated[
-        Path | None,
-        option(
-            "--save FILE",
-            "Write the playground as one HTML file that runs without a server, and end.",
-        ),
-    ] = None,
+    recording: Path | None = optional("--recording FILE", "Recording to compare the steps with."),
+    body: str | None = optional("--body", "Body of the recording."),
+    live: int | None = optional(
+        "--live PORT", "Port that publishes the tank as a tracker's stream; 0 for a free port."
+    ),
+    save: Path | None = optional(
+        "--save FILE", "Write the playground as one HTML file that runs without a server, and end."
+    ),
     overwrite: Replace = False,
     port: Port = 8765,
     host: Host = "127.0.0.1",

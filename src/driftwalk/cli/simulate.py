@@ -11,7 +11,15 @@ from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_s
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.model import KnownModel, ModelName, ParameterValues, known_model
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared_types import BodyOfLike, Json, Replace, Run, flow_option, option
+from driftwalk.cli.options.shared_types import (
+    BodyOfLike,
+    Json,
+    Replace,
+    Run,
+    flow_of_run,
+    option,
+    optional,
+)
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -51,29 +59,24 @@ def simulate(
     out: Annotated[Path, option("--out -o FILE.nc", "File to write.")],
     given: StudyOptions,
     run: Run = None,
-    flow: Annotated[
-        Path | None,
-        flow_option(
-            "Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
-            "For the block, and for a --model that uses it."
-        ),
-    ] = None,
+    flow: Path | None = optional(
+        "--flow FILE",
+        "Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
+        "For the block, and for a --model that uses it.",
+        callback=flow_of_run,
+    ),
     model: ModelName = None,
     parameters: ParameterValues = None,
-    like: Annotated[
-        Path | None,
-        option(
-            "--like RECORDING",
-            "Recording that gives start, time stamps and gaps (driftwalk's NetCDF or plain CSV).",
-        ),
-    ] = None,
+    like: Path | None = optional(
+        "--like RECORDING",
+        "Recording that gives start, time stamps and gaps (driftwalk's NetCDF or plain CSV).",
+    ),
     body: BodyOfLike = None,
-    backend: Annotated[
-        str,
-        option(
-            "--backend cpu|reference", "Backend: cpu for single, reference for double precision."
-        ),
-    ] = "cpu",
+    backend: str = optional(
+        "--backend cpu|reference",
+        "Backend: cpu for single, reference for double precision.",
+        default="cpu",
+    ),
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:

@@ -32,7 +32,8 @@ from driftwalk.cli.options.shared_types import (
     Replace,
     Run,
     argument,
-    option,
+    flag,
+    optional,
 )
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
@@ -70,9 +71,7 @@ def study(ctx: typer.Context) -> None:
 @study_app.command(cls=HelpCommand)
 def new(
     path: Annotated[Path | None, argument("[FILE]", "File to write (default: -, stdout).")] = None,
-    full: Annotated[
-        bool, option("--full", "List every parameter with its unit and meaning.")
-    ] = False,
+    full: bool = flag("--full", "List every parameter with its unit and meaning."),
     overwrite: Replace = False,
 ) -> None:
     """Print a study file with what differs from tank to tank, or with --full every parameter."""
@@ -132,32 +131,20 @@ def recover(
     model: ModelName = None,
     parameters: ParameterValues = None,
     known: KnownParameters = None,
-    like: Annotated[
-        Path | None,
-        option(
-            "--like RECORDING",
-            "Recording that gives start, time stamps, gaps and camera, with --model.",
-        ),
-    ] = None,
+    like: Path | None = optional(
+        "--like RECORDING",
+        "Recording that gives start, time stamps, gaps and camera, with --model.",
+    ),
     body: BodyOfLike = None,
-    sample_rate: Annotated[
-        Any,
-        option(
-            "--sample-rate",
-            "Samples per second, with --model (default: 10).",
-            unit="Hz",
-            panel=PANEL,
-        ),
-    ] = None,
-    threads: Annotated[
-        int | None,
-        option(
-            "--threads N",
-            "Recordings to fit at the same time; threads of a calibration with --model "
-            "(default: one per core).",
-            min=1,
-        ),
-    ] = None,
+    sample_rate: Any = optional(
+        "--sample-rate", "Samples per second, with --model (default: 10).", unit="Hz", panel=PANEL
+    ),
+    threads: int | None = optional(
+        "--threads N",
+        "Recordings to fit at the same time; threads of a calibration with --model "
+        "(default: one per core).",
+        min=1,
+    ),
     *,
     options: RunOptions,
 ) -> None:

@@ -118,7 +118,7 @@ class HiddenMarkovWalk(Baseline):
         state[:, 0] = _chosen(begin[None], chance[:, 0])
         for k in range(1, count):
             state[:, k] = _chosen(moves[state[:, k - 1]], chance[:, k])
-        length, turn = np.empty((2, *state.shape))
+        length, turn = np.empty(state.shape), np.empty(state.shape)
         for world, (one, row) in enumerate(zip(random.generators, state, strict=True)):
             length[world] = one.gamma(walk.shape[row], walk.scale[row])
             turn[world] = one.vonmises(walk.direction[row], walk.concentration[row])

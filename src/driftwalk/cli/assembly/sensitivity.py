@@ -13,7 +13,7 @@ from driftwalk.cli.inputs.model_source import RUN_NAMES, Source, assembly_source
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.inputs.varied import listed, read_varied
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option
+from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import InputError
@@ -64,9 +64,9 @@ def sensitivity(
     run: Run = None,
     flow: FlowFile = None,
     vary: Vary = None,
-    sobol: Annotated[
-        int | None, option("--sobol N", "Base samples for Sobol' indices, a power of two.", min=8)
-    ] = None,
+    sobol: int | None = optional(
+        "--sobol N", "Base samples for Sobol' indices, a power of two.", min=8
+    ),
     *,
     options: RunOptions,
 ) -> None:

@@ -65,6 +65,20 @@ def option(names: str, help: str, *, panel: str | None = None, unit: str = "", *
     )
 
 
+def optional(names: str, help: str, *, default: Any = None, **more: Any) -> Any:
+    """Return the declaration of an option that may be left out, as the default of a parameter."""
+    declared = option(names, help, **more)
+    # In an annotation, the name of an option is where the default is here.
+    declared.param_decls = (declared.default, *declared.param_decls)
+    declared.default = default
+    return declared
+
+
+def flag(name: str, help: str) -> Any:
+    """Return the declaration of an option without a value, as the default of a parameter."""
+    return optional(name, help, default=False)
+
+
 def argument(placeholder: str, help: str) -> Any:
     """Return the declaration of an argument."""
     return typer.Argument(metavar=placeholder, help=help)
@@ -80,12 +94,8 @@ def parse_scale(text: Any) -> Any:
     return quantity_parser("m")(text)
 
 
-def flow_option(help: str) -> Any:
-    """Return the declaration of an option for a flow field, or for the run that holds it."""
-    return option("--flow FILE", help, callback=_flow_of_run)
-
-
-def _flow_of_run(path: Path | None) -> Path | None:
+def flow_of_run(path: Path | None) -> Path | None:
+    """Return the flow field in a run directory; any other path as it is."""
     if path is None or not path.is_dir():
         return path
     from driftwalk.core.files.run_layout import run_file
@@ -111,7 +121,12 @@ StudyFile = Annotated[
     option("--study FILE", "Study file with the parameters (see: driftwalk study new)."),
 ]
 FlowFile = Annotated[
-    Path | None, flow_option("Flow field to use, or the run directory that holds it.")
+    Path | None,
+    option(
+        "--flow FILE",
+        "Flow field to use, or the run directory that holds it.",
+        callback=flow_of_run,
+    ),
 ]
 FrameInterval = Annotated[
     float | None,

@@ -11,7 +11,7 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.inputs.recordings import open_kind
 from driftwalk.cli.options.flatten_options import option_field, with_options
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared_types import Json, Replace, argument, option
+from driftwalk.cli.options.shared_types import Json, Replace, argument, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -75,10 +75,10 @@ def classify(
     given: StudyOptions,
     how: RecordingOptions,
     criteria: JoinCriteria,
-    chirality: Annotated[
-        Literal["merged", "distinct"], option("--chirality", "Mirror images as one shape or two.")
-    ] = "merged",
-    out: Annotated[Path | None, option("--out -o FILE.nc", "File for the result.")] = None,
+    chirality: Literal["merged", "distinct"] = optional(
+        "--chirality", "Mirror images as one shape or two.", default="merged"
+    ),
+    out: Path | None = optional("--out -o FILE.nc", "File for the result."),
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:

@@ -10,10 +10,10 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared_types import Json, Replace, option
+from driftwalk.cli.options.shared_types import Json, Replace, optional
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.recordings.live_output import LiveOutputs
 from driftwalk.cli.terminal.output import (
@@ -41,18 +41,14 @@ _SHOWN = {"duplicates": "doubled"}
 @with_options(TrackingOptions)
 def track(
     options: TrackingOptions,
-    out: Annotated[
-        Path | None, option("--out -o FILE.nc", "Recording to write; needed without --explain.")
-    ] = None,
-    explain: Annotated[
-        int | None,
-        option(
-            "--explain FRAME",
-            "Write a PNG of this frame that shows each candidate and why it was "
-            "rejected, then exit.",
-            min=0,
-        ),
-    ] = None,
+    out: Path | None = optional(
+        "--out -o FILE.nc", "Recording to write; needed without --explain."
+    ),
+    explain: int | None = optional(
+        "--explain FRAME",
+        "Write a PNG of this frame that shows each candidate and why it was rejected, then exit.",
+        min=0,
+    ),
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:
