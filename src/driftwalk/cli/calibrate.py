@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from driftwalk.cli.inputs.recordings import read_for_models
-from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
+from driftwalk.cli.options.model import ModelName, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import FlowFile, flag
+from driftwalk.cli.options.shared_types import FlowFile, flag, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
@@ -25,7 +25,10 @@ def calibrate(
     given: StudyOptions,
     how: RecordingOptions,
     model: ModelName = None,
-    parameters: ParameterChoices = None,
+    parameters: list[str] | None = optional(
+        "--parameter NAME=VALUE|LOW,HIGH",
+        "Known value, or range of the search, of a parameter of --model; repeat for others.",
+    ),
     flow: FlowFile = None,
     posterior: bool = flag(
         "--posterior",

@@ -83,12 +83,9 @@ def compare(
     motions = load_motion(a, how), load_motion(b, how_b)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        interval = None if step_interval == "auto" else step_interval
         result = compare_motions(
-            *motions,
-            step_interval=None if step_interval == "auto" else step_interval,
-            ties=ties,
-            permutations=permutations,
-            seed=seed,
+            *motions, step_interval=interval, ties=ties, permutations=permutations, seed=seed
         )
     if out is not None:
         save_dataset(result, out)

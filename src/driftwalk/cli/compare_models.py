@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from driftwalk.cli.inputs.recordings import read_for_models
-from driftwalk.cli.options.model import ComparedParameters, parameter_choices
+from driftwalk.cli.options.model import parameter_choices
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import FlowFile, optional
@@ -34,7 +34,11 @@ def compare_models(
         "Models, separated by commas, such as block,run_tumble+wall; or all. Default: the "
         "block and the family with an interaction with the wall.",
     ),
-    parameters: ComparedParameters = None,
+    parameters: list[str] | None = optional(
+        "--parameter NAME=VALUE|LOW,HIGH",
+        "Known value, or range of the search, of a parameter of each of the --models that has "
+        "it; repeat for others.",
+    ),
     clearance: float | None = optional(
         "--clearance",
         "Distance of the recorded point from the wall at contact: half the body's width. "

@@ -154,12 +154,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0
     """
     command = to_click_command(app)
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = command.main(
-            args=list(sys.argv[1:] if arguments is None else arguments),
-            prog_name="driftwalk",
-            standalone_mode=False,
-        )
+        code = command.main(args=words, prog_name="driftwalk", standalone_mode=False)
         # Output that still sits in a buffer may fail only now: a full disk, a closed pipe.
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt) as error:

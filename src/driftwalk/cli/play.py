@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_source
 from driftwalk.cli.inputs.other_files import explained
-from driftwalk.cli.options.model import KnownModel, ModelName, PlayedParameters, playable_model
+from driftwalk.cli.options.model import KnownModel, ModelName, playable_model
 from driftwalk.cli.options.shared_types import FlowFile, Replace, Run, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_note, print_warnings
@@ -39,7 +39,11 @@ def play(
     run: Run = None,
     flow: FlowFile = None,
     model: ModelName = None,
-    parameters: PlayedParameters = None,
+    parameters: list[str] | None = optional(
+        "--parameter NAME=VALUE|LOW,HIGH",
+        "Value to begin with, or range of the slider, of a parameter of --model; repeat for "
+        "others.",
+    ),
     recording: Path | None = optional("--recording FILE", "Recording to compare the steps with."),
     body: str | None = optional("--body", "Body of the recording."),
     live: int | None = optional(
@@ -134,14 +138,9 @@ def _of_model(
     else:
         field = source.flow_for(known.model, chosen, flow)
     print_warnings(known.warnings)
+    seed = chosen.assembly.seed
     return ModelPlaySource(
-        known.model,
-        known.values,
-        chosen,
-        flow=field,
-        recording=beside,
-        body=body,
-        seed=chosen.assembly.seed,
+        known.model, known.values, chosen, flow=field, recording=beside, body=body, seed=seed
     )
 
 

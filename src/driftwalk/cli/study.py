@@ -18,7 +18,6 @@ from driftwalk.cli.inputs.model_source import (
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.model import (
     KnownModel,
-    KnownParameters,
     ModelName,
     ParameterValues,
     partly_known_model,
@@ -130,7 +129,10 @@ def recover(
     run: Run = None,
     model: ModelName = None,
     parameters: ParameterValues = None,
-    known: KnownParameters = None,
+    known: list[str] | None = optional(
+        "--known NAME",
+        "Parameter of --model, or position_noise, that the calibrations know; repeat for others.",
+    ),
     like: Path | None = optional(
         "--like RECORDING",
         "Recording that gives start, time stamps, gaps and camera, with --model.",

@@ -202,12 +202,9 @@ def _profiles(
     setting = posterior.solution.setting
     if not np.array_equal(order(setting[None])[0], setting):
         return None
+    std = wider * posterior.sample.std(axis=0)
     found = discrepancy_profiles(
-        posterior.emulator,
-        recorded,
-        posterior.solution,
-        wider * posterior.sample.std(axis=0),
-        reach=GAUSS_NEWTON.reach,
+        posterior.emulator, recorded, posterior.solution, std, reach=GAUSS_NEWTON.reach
     )
     place = np.clip(found.place - bias[:, None], 0.0, 1.0)
     return Profiles(place, found.rise / wider[:, None] ** 2)

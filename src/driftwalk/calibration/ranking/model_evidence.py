@@ -88,15 +88,14 @@ class EvidenceRanking(NamedTuple):
 
         One with more of them has to be likelier than by chance.
         """
-        best = self.best
+        if self.best is None:
+            return []
+        numbers = entries[self.best].numbers
+        clearly_less = evidence[self.best].deviance - EVIDENCE.doubt
         return [
             k
             for k in self.alternatives
-            if best is not None
-            and (
-                evidence[k].deviance < evidence[best].deviance - EVIDENCE.doubt
-                or entries[k].numbers <= entries[best].numbers
-            )
+            if evidence[k].deviance < clearly_less or entries[k].numbers <= numbers
         ]
 
 
@@ -233,14 +232,11 @@ def estimate_evidence(
     found = synthetic_likelihood_at(
         lambda settings: objective(settings)[:, 0], objective.recorded[0], setting, replicates
     )
-    evidence = Evidence(
-        discrepancy=Discrepancy.of(found.discrepancy, found.own_discrepancies),
-        # Laplace's approximation, with a prior that is even over the ranges.
-        deviance=found.discrepancy
-        + found.log_variance
-        - log_volume
-        - parameters * float(np.log(2.0 * np.pi)),
-    )
+    # Laplace's approximation, with a prior that is even over the ranges.
+    log_constant = parameters * float(np.log(2.0 * np.pi))
+    deviance = found.discrepancy + found.log_variance - log_volume - log_constant
+    discrepancy = Discrepancy.of(found.discrepancy, found.own_discrepancies)
+    evidence = Evidence(discrepancy, deviance)
     if entry.baseline or evidence.discrepancy.against:
         return evidence
     worlds = objective.worlds.simulated(setting[None], HELD_OUT_REPLICATES, stage="judged")

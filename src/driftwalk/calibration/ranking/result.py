@@ -214,13 +214,8 @@ def model_verdicts(
     found = []
     for k, (entry, one) in enumerate(zip(entries, held_out, strict=True)):
         asked = evidence.get(k)
-        against, unable = law_findings(
-            entry,
-            one,
-            motion,
-            discrepancy=None if asked is None else asked.discrepancy,
-            bouts=() if asked is None else asked.bouts,
-        )
+        discrepancy, bouts = (None, ()) if asked is None else (asked.discrepancy, asked.bouts)
+        against, unable = law_findings(entry, one, motion, discrepancy=discrepancy, bouts=bouts)
         # Those that the summaries speak for stand beside the first.
         named = k in (answer.best, *answer.alternatives)
         if asked is not None and not (named or asked.discrepancy.against or answer.best is None):
