@@ -212,8 +212,7 @@ class Stages:
         found: dict[int, Evidence] = {}
         for number, index in enumerate(shortlist.models):
             numbers = [entries[k].numbers for k, one in found.items() if one.discrepancy.usual]
-            is_simplest = entries[index].numbers < min(numbers, default=math.inf)
-            if number < shortlist.tied or is_simplest:
+            if number < shortlist.tied or entries[index].numbers < min(numbers, default=math.inf):
                 planned = max(shortlist.tied, 1)
                 found[index] = self._matched(len(found), index, held_out[index].point, planned)
         if any(one.discrepancy.usual for one in found.values()):

@@ -71,16 +71,19 @@ class ProgressReporter:
             self._bar.stop()
 
     @property
-    def left(self) -> str:
-        """The time left in words, from the work done so far; empty where nothing is left.
+    def left_s(self) -> float | None:
+        """The time left [s], from the work done so far; None while too little is done to say.
 
-        It is also empty while too little is done to say. Work of an earlier run that was killed
-        does not count: it took no time now.
+        Work of an earlier run that was killed does not count: it took no time now.
         """
+        return None if self._ends is None else max(self._ends - self._clock(), 0.0)
+
+    @property
+    def left(self) -> str:
+        """The time left in words; empty where it is unknown, or nothing is left."""
         from driftwalk.schema.answers.parts import duration_text
 
-        left_s = 0.0 if self._ends is None else self._ends - self._clock()
-        return f"{duration_text(left_s)} left" if left_s > 0.0 else ""
+        return f"{duration_text(self.left_s)} left" if self.left_s else ""
 
     def __call__(self, done: int, total: int, text: str = "") -> None:
         """Say that `done` of `total` parts are complete, and what is under way."""
