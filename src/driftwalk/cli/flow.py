@@ -66,6 +66,7 @@ def flow(
     """
     from driftwalk.cli.inputs.flow_file import read_flow_file
     from driftwalk.conditions import (
+        flow_by_study,
         is_stated,
         load_with_study,
         require_motion,
@@ -73,7 +74,6 @@ def flow(
         study_of_block,
         unstated_warning,
     )
-    from driftwalk.conditions.recorded import flow_by_study
     from driftwalk.flow import flow_from_tracers, save_flow
 
     existing = "replace" if overwrite else "error"

@@ -153,7 +153,25 @@ def flow_by_study(
     body: str | None = None,
     arena: dict[str, Any] | None = None,
 ) -> xr.Dataset:
-    """Return the flow field of a trajectory, with the block, the water and [flow] of a study."""
+    """Return the flow field of a trajectory, with the block, the water and [flow] of a study.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A `trajectory`.
+    study : Study
+        Block, water and the section [flow].
+    body : str, optional
+        The body where there are several, or "all" of them.
+    arena : dict, optional
+        The tank; default: that of the trajectory.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> int(dw.conditions.flow_by_study(dw.tank30_recording(), dw.Study()).sizes["x"])
+    50
+    """
     settings = study.flow
     return extract_flow(
         trajectory,
