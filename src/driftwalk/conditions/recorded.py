@@ -164,7 +164,7 @@ def flow_by_study(
     body : str, optional
         The body where there are several, or "all" of them.
     arena : dict, optional
-        The tank; default: that of the trajectory.
+        The tank; default: the one that the trajectory states.
 
     Examples
     --------
