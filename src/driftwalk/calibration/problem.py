@@ -186,11 +186,8 @@ def score_settings(
     """Simulate settings and compare each world with the recording."""
     columns = [np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in settings]
     trial = trial_in(stage, np.asarray(numbers))
-    keys = world_keys(
-        problem.study.calibration.seed,
-        trial=trial[:, None],
-        replicate=np.asarray(replicates)[None, :],
-    )
+    seed = problem.study.calibration.seed
+    keys = world_keys(seed, trial=trial[:, None], replicate=np.asarray(replicates)[None, :])
     values = {
         parameter.name: np.repeat(parameter.to_value(column), len(replicates))
         for parameter, column in zip(problem.parameters, columns, strict=True)

@@ -211,17 +211,13 @@ def _recording(problem: Problem) -> dict[str, _Variable]:
     density = joint_density(
         length, angle, step_length_edge=length_edge, turning_angle_edge=angle_edge
     )
+    bins = ("density_step_length", "density_turning_angle")
+    excerpt = problem.like.sample_time[: excerpt_samples(problem.like)]
     return {
         "recording_step_length": (("recording_step",), length),
         "recording_turning_angle": (("recording_step",), angle),
-        "recording_step_density": (
-            ("density_step_length", "density_turning_angle"),
-            density.astype(np.float32),
-        ),
-        "excerpt_time": (
-            ("excerpt_sample",),
-            problem.like.sample_time[: excerpt_samples(problem.like)],
-        ),
+        "recording_step_density": (bins, density.astype(np.float32)),
+        "excerpt_time": (("excerpt_sample",), excerpt),
     }
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 from driftwalk.cli.inputs.recordings import read_for_models
-from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
+from driftwalk.cli.options.model import ModelName, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import FlowFile, option
+from driftwalk.cli.options.shared_types import FlowFile, flag, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
@@ -27,16 +25,16 @@ def calibrate(
     given: StudyOptions,
     how: RecordingOptions,
     model: ModelName = None,
-    parameters: ParameterChoices = None,
+    parameters: list[str] | None = optional(
+        "--parameter NAME=VALUE|LOW,HIGH",
+        "Known value, or range of the search, of a parameter of --model; repeat for others.",
+    ),
     flow: FlowFile = None,
-    posterior: Annotated[
-        bool,
-        option(
-            "--posterior",
-            "Also write posterior.csv: draws from the approximate posterior of a --model with "
-            "more than two parameters.",
-        ),
-    ] = False,
+    posterior: bool = flag(
+        "--posterior",
+        "Also write posterior.csv: draws from the approximate posterior of a --model with "
+        "more than two parameters.",
+    ),
     *,
     options: RunOptions,
 ) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePath
 from typing import Annotated, Any
 
-from driftwalk.cli.options.shared_types import Json, argument, option
+from driftwalk.cli.options.shared_types import Json, argument, flag
 from driftwalk.cli.terminal.output import print_json, print_warnings, printable
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, state_of
@@ -19,9 +19,7 @@ from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 def cite(
     run: Annotated[Path, argument("RUN", "Directory of a finished run, or a simulation (.nc).")],
-    bibtex_entries: Annotated[
-        bool, option("--bibtex", "Print the program and the paper for BibTeX.")
-    ] = False,
+    bibtex_entries: bool = flag("--bibtex", "Print the program and the paper for BibTeX."),
     json: Json = False,
 ) -> None:
     """Say what to cite for a run: the program, what it computed, and the methods that it used.

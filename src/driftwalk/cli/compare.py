@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from driftwalk.cli.inputs.recordings import load_motion
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared_types import Json, Replace, argument, option
+from driftwalk.cli.options.shared_types import Json, Replace, argument, optional
 from driftwalk.cli.options.study import study_option
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -54,19 +54,18 @@ def compare(
     a: Annotated[Path, argument("A", "Recording, or output of driftwalk simulate.")],
     b: Annotated[Path, argument("B", "Recording, or output of driftwalk simulate.")],
     how: RecordingOptions,
-    body_b: Annotated[str | None, option("--body-b", "Body in B (default: same as A).")] = None,
+    body_b: str | None = optional("--body-b", "Body in B (default: same as A)."),
     step_interval: Annotated[Any, study_option("step_interval")] = None,
-    ties: Annotated[
-        Literal["strict", "limits"],
-        option(
-            "--ties", "Treatment of points that tie with an origin: in no quadrant, or in each."
-        ),
-    ] = "strict",
-    permutations: Annotated[
-        int, option("--permutations N", "Permutations of the test; 0 for no test.", min=0)
-    ] = 999,
-    seed: Annotated[int, option("--seed N", "Seed of the permutations.", min=0)] = 1,
-    out: Annotated[Path | None, option("--out -o FILE.nc", "File for the comparison.")] = None,
+    ties: Literal["strict", "limits"] = optional(
+        "--ties",
+        "Treatment of points that tie with an origin: in no quadrant, or in each.",
+        default="strict",
+    ),
+    permutations: int = optional(
+        "--permutations N", "Permutations of the test; 0 for no test.", min=0, default=999
+    ),
+    seed: int = optional("--seed N", "Seed of the permutations.", min=0, default=1),
+    out: Path | None = optional("--out -o FILE.nc", "File for the comparison."),
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:
@@ -84,19 +83,17 @@ def compare(
     motions = load_motion(a, how), load_motion(b, how_b)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        interval = None if step_interval == "auto" else step_interval
         result = compare_motions(
-            *motions,
-            step_interval=None if step_interval == "auto" else step_interval,
-            ties=ties,
-            permutations=permutations,
-            seed=seed,
+            *motions, step_interval=interval, ties=ties, permutations=permutations, seed=seed
         )
     if out is not None:
         save_dataset(result, out)
     summary = summarise(result)
     # What `compare` warned of in passing stands in the result as well, there with the motion.
     noted = " ".join(summary["warnings"])
-    summary["warnings"] += [text for text in map(_text, caught) if text not in noted]
+    said = [str(one.message) for one in caught]
+    summary["warnings"] += [text for text in said if text not in noted]
     if json:
         print_json({"a": a, "b": b, **summary})
         return
@@ -124,10 +121,6 @@ def summarise(result: xr.Dataset) -> dict[str, Any]:
         **motions,
         "warnings": json_module.loads(result.attrs["warnings"]),
     }
-
-
-def _text(caught: warnings.WarningMessage) -> str:
-    return str(caught.message)
 
 
 def _print(summary: dict[str, Any]) -> None:

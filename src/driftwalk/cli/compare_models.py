@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
 
 from driftwalk.cli.inputs.recordings import read_for_models
-from driftwalk.cli.options.model import ComparedParameters, parameter_choices
+from driftwalk.cli.options.model import parameter_choices
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import FlowFile, option
+from driftwalk.cli.options.shared_types import FlowFile, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_result, printable
 from driftwalk.cli.terminal.progress import ProgressReporter
@@ -30,24 +29,22 @@ def compare_models(
     recording: RecordingFile,
     given: StudyOptions,
     how: RecordingOptions,
-    models: Annotated[
-        str | None,
-        option(
-            "--models NAMES",
-            "Models, separated by commas, such as block,run_tumble+wall; or all. Default: the "
-            "block and the family with an interaction with the wall.",
-        ),
-    ] = None,
-    parameters: ComparedParameters = None,
-    clearance: Annotated[
-        float | None,
-        option(
-            "--clearance",
-            "Distance of the recorded point from the wall at contact: half the body's width. "
-            "Default: estimated from the recording.",
-            unit="m",
-        ),
-    ] = None,
+    models: str | None = optional(
+        "--models NAMES",
+        "Models, separated by commas, such as block,run_tumble+wall; or all. Default: the "
+        "block and the family with an interaction with the wall.",
+    ),
+    parameters: list[str] | None = optional(
+        "--parameter NAME=VALUE|LOW,HIGH",
+        "Known value, or range of the search, of a parameter of each of the --models that has "
+        "it; repeat for others.",
+    ),
+    clearance: float | None = optional(
+        "--clearance",
+        "Distance of the recorded point from the wall at contact: half the body's width. "
+        "Default: estimated from the recording.",
+        unit="m",
+    ),
     flow: FlowFile = None,
     *,
     options: RunOptions,

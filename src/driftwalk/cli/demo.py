@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.cli.options.shared_types import Json, Overwrite, Threads, option
+from driftwalk.cli.options.shared_types import Json, Overwrite, Threads, flag, optional
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.progress import ignore_progress
@@ -43,10 +43,8 @@ PAGE = "report.html"
 
 
 def demo(
-    out: Annotated[Path, option("--out -o DIR", "Directory of both runs.")] = Path("demo"),
-    quick: Annotated[
-        bool, option("--quick", "Search only a small part; takes seconds, not minutes.")
-    ] = False,
+    out: Path = optional("--out -o DIR", "Directory of both runs.", default=Path("demo")),
+    quick: bool = flag("--quick", "Search only a small part; takes seconds, not minutes."),
     threads: Threads = None,
     overwrite: Overwrite = False,
     json: Json = False,
@@ -78,7 +76,9 @@ def demo(
         fitted |= {"flow_error": _flow_error(stored, recording)}
         _write_page(out, FIT)
         if not json:
-            print_check(fitted)
+            off = in_percent(fitted["flow_error"], decimals=1)
+            _print_row("flow past the block", "", f"{off} off")
+            _print_quality("fit", fitted, floor="ks_noise_floor")
             print_page(out / PAGE)
         field = load_flow(flow, arena=study.tank.to_arena(), own_flags="keep")
         inputs = {**inputs, "flow": flow}
@@ -86,12 +86,14 @@ def demo(
         _run(search, out / CALIBRATION, overwrite=overwrite)
     calibration = open_netcdf(out / CALIBRATION / run_kind("calibration").file)
     _write_page(out, FIT, CALIBRATION)
+    found = calibration_answer(calibration).facts
     if json:
-        found = calibration_answer(calibration).facts
         print_json({"truth": demo_truth(), "fit": fitted, "calibration": found})
-    else:
-        print_calibration(calibration)
-        _print_places(out, out / PAGE)
+        return
+    _print_estimates("KS map in the fitted flow", calibration)
+    _print_quality("KS map", found, floor="noise_floor")
+    print(f"\nfigures: {out}/fit/figures, {out}/calibrate/figures")
+    print(f"open in a browser: {out / PAGE}")
 
 
 def demo_study(*, quick: bool) -> Study:
@@ -200,36 +202,11 @@ def print_fit(fit: xr.Dataset) -> None:
     )
 
 
-def print_check(fit: dict[str, Any]) -> None:
-    """Print how far the flow is off, the verdict on the model, and what warns."""
-    _print_row("flow past the block", "", f"{in_percent(fit['flow_error'], decimals=1)} off")
-    _print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
-    _print_verdict(fit)
-    for warning in fit["warnings"]:
-        print_note(f"warning: fit: {warning}")
-
-
 def print_page(page: Path) -> None:
     """Say what comes next: the page of the fit can be opened meanwhile."""
     print(f"Its page: {page}")
     # How long it takes stands at the bar below, which measures it.
     print("Next, the paper's method: a map of KS distances in the fitted flow.\n", flush=True)
-
-
-def print_calibration(calibration: xr.Dataset) -> None:
-    """Print the minimum of the map next to the truth, and its warnings."""
-    search = calibration_answer(calibration).facts
-    _print_estimates("KS map in the fitted flow", calibration)
-    _print_row("KS distance, floor", "", _distance(search))
-    _print_verdict(search)
-    for warning in search["warnings"]:
-        print_note(f"warning: KS map: {warning}")
-
-
-def _print_places(folder: Path, page: Path) -> None:
-    """Print where the figures are and, last, the page to open."""
-    print(f"\nfigures: {folder}/fit/figures, {folder}/calibrate/figures")
-    print(f"open in a browser: {page}")
 
 
 def _print_estimates(method: str, found: xr.Dataset) -> None:
@@ -252,11 +229,11 @@ def _print_row(name: str, truth: str, found: str) -> None:
     print(f"{name:27}{truth:9}{found}".rstrip())
 
 
-def _distance(facts: dict[str, Any], floor: str = "noise_floor") -> str:
-    return f"{facts['ks_distance']:.3f}, {facts[floor]:.3f}"
-
-
-def _print_verdict(facts: dict[str, Any]) -> None:
+def _print_quality(name: str, facts: dict[str, Any], *, floor: str) -> None:
+    """Print how far off simulations are, the verdict on the model, and what warns."""
+    _print_row("KS distance, floor", "", f"{facts['ks_distance']:.3f}, {facts[floor]:.3f}")
     _print_row("verdict", "", facts["verdict"])
     for reason in facts["verdict_reasons"]:
         print_note(f"{facts['verdict']}: {reason}")
+    for warning in facts["warnings"]:
+        print_note(f"warning: {name}: {warning}")

@@ -6,12 +6,12 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-from driftwalk.cli.options.shared_types import Json, argument, option
+from driftwalk.cli.options.shared_types import Json, argument, flag, option, optional
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note, print_row
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
-from driftwalk.export import TARGETS, Source, Verification, export_run, target_named
+from driftwalk.export import TARGETS, Source, export_run, target_named
 
 
 def export(
@@ -31,29 +31,21 @@ def export(
         ),
     ],
     out: Annotated[Path, option("--out -o DIR", "New or empty folder to write.")],
-    flow: Annotated[
-        Path | None,
-        option("--flow FILE", "Flow field for a study file, or in place of a run's own."),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        option("--seed N", "Seed of the stochastic force (default: the study's).", min=0),
-    ] = None,
-    replicate: Annotated[
-        int | None,
-        option(
-            "--replicate N",
-            "Replicate of a simulation to take, counted from 0 (default: all; of a film the "
-            "first).",
-            min=0,
-        ),
-    ] = None,
-    speed: Annotated[
-        float | None, option("--speed", "How much faster than real time a film is (default: 1).")
-    ] = None,
-    verify: Annotated[
-        bool, option("--verify", "Run what was written, and compare it with driftwalk.")
-    ] = False,
+    flow: Path | None = optional(
+        "--flow FILE", "Flow field for a study file, or in place of a run's own."
+    ),
+    seed: int | None = optional(
+        "--seed N", "Seed of the stochastic force (default: the study's).", min=0
+    ),
+    replicate: int | None = optional(
+        "--replicate N",
+        "Replicate of a simulation to take, counted from 0 (default: all; of a film the first).",
+        min=0,
+    ),
+    speed: float | None = optional(
+        "--speed", "How much faster than real time a film is (default: 1)."
+    ),
+    verify: bool = flag("--verify", "Run what was written, and compare it with driftwalk."),
     json: Json = False,
 ) -> int:
     """Export a model for a simulator, motion for another program, or figures for print.
@@ -84,7 +76,7 @@ def export(
                 "to": to,
                 "files": [path.relative_to(out).as_posix() for path in files],
                 "notes": notes,
-                "verification": None if outcome is None else _facts(outcome),
+                "verification": outcome and {"passed": outcome.passed, **outcome.numbers},
             }
         )
     else:
@@ -92,13 +84,8 @@ def export(
             print_note(f"note: {note}")
         print_row("folder", f"{out}: {target.gives}")
         print_row("begin with", out / "README.md")
-        for line in () if outcome is None else outcome.lines:
-            print_row(
-                "verified" if outcome is not None and outcome.passed else "NOT VERIFIED", line
-            )
+        if outcome is not None:
+            for line in outcome.lines:
+                print_row("verified" if outcome.passed else "NOT VERIFIED", line)
         print(f"next: read {out / 'README.md'}", file=sys.stderr)
     return 0 if outcome is None or outcome.passed else 1
-
-
-def _facts(outcome: Verification) -> dict[str, float | int | bool]:
-    return {"passed": outcome.passed, **outcome.numbers}

@@ -6,11 +6,19 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from driftwalk.cli.inputs.model_source import load_flow_for
+from driftwalk.cli.inputs.model_source import given_files, load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared_types import Json, Overwrite, argument, flow_of_run, option
+from driftwalk.cli.options.shared_types import (
+    Json,
+    Overwrite,
+    argument,
+    flag,
+    flow_of_run,
+    option,
+    optional,
+)
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result
@@ -41,44 +49,26 @@ def fit(
     out: Annotated[Path, option("--out -o DIR", "Run directory to make.")],
     given: StudyOptions,
     how: RecordingOptions,
-    flow: Annotated[
-        Path | None,
-        option(
-            "--flow FILE",
-            "Flow that was measured, as by PIV, steady or a series: the prior of the fitted flow.",
-            callback=flow_of_run,
-            show_default=False,
-        ),
-    ] = None,
-    start: Annotated[
-        str | None,
-        option(
-            "--from s|RUN",
-            "First time to keep; or, for glued blocks (--body-shape xx), the finished fit of one "
-            "block in the same water.",
-            show_default=False,
-        ),
-    ] = None,
-    interaction: Annotated[
-        bool,
-        option(
-            "--interaction",
-            "Fit all free bodies of the recording together, and say how far they share the force.",
-        ),
-    ] = False,
-    no_check: Annotated[
-        bool, option("--no-check", "Skip the check whether the model explains the recording.")
-    ] = False,
-    compare_laws: Annotated[
-        bool,
-        option(
-            "--compare-laws",
-            "Compare force laws by evidence and held out prediction (takes some eight fits).",
-        ),
-    ] = False,
-    wall: Annotated[
-        bool, option("--wall", "Estimate restitution and friction of the wall from the contacts.")
-    ] = False,
+    flow: Path | None = optional(
+        "--flow FILE",
+        "Flow that was measured, as by PIV, steady or a series: the prior of the fitted flow.",
+        callback=flow_of_run,
+    ),
+    start: str | None = optional(
+        "--from s|RUN",
+        "First time to keep; or, for glued blocks (--body-shape xx), the finished fit of one "
+        "block in the same water.",
+    ),
+    interaction: bool = flag(
+        "--interaction",
+        "Fit all free bodies of the recording together, and say how far they share the force.",
+    ),
+    no_check: bool = flag("--no-check", "Skip the check whether the model explains the recording."),
+    compare_laws: bool = flag(
+        "--compare-laws",
+        "Compare force laws by evidence and held out prediction (takes some eight fits).",
+    ),
+    wall: bool = flag("--wall", "Estimate restitution and friction of the wall from the contacts."),
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -104,8 +94,7 @@ def fit(
     read = read_for_run(recordings, given, how, before=before)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     fitted = earlier and earlier / run_kind("fit").file
-    files = {"study": given.file, "flow": flow, "earlier": fitted}
-    inputs |= {role: path for role, path in files.items() if path}
+    inputs |= given_files(study=given.file, flow=flow, earlier=fitted)
     field = None if flow is None else load_flow_for(flow, read.study)
     effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))
     source = "recording" if earlier is None else str(earlier)

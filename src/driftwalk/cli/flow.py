@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared_types import FlowVariables, FrameInterval, Json, Replace, option
+from driftwalk.cli.options.shared_types import (
+    FlowVariables,
+    FrameInterval,
+    Json,
+    Replace,
+    flag,
+    option,
+)
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -23,17 +30,8 @@ from driftwalk.core.study_keys import FLOW_KEYS
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
-
-OF_A_BODY: Final = (
-    "body_shape",
-    "side",
-    "mass",
-    "depth",
-    "window",
-    "inertia",
-    "flow_drag_coefficient",
-)
+BODY: Final = ("body_shape", "side", "mass", "depth")
+OF_A_BODY: Final = (*BODY, "window", "inertia", "flow_drag_coefficient")
 """Options that say something of a floating body, which no tracer is."""
 NOISE: Final = FLOW_KEYS["position_noise"]
 
@@ -41,7 +39,7 @@ NOISE: Final = FLOW_KEYS["position_noise"]
 @with_recording_options
 @with_study_options(
     FLOW_KEYS,
-    *("body_shape", "side", "mass", "depth"),
+    *BODY,
     *("cells", "cell_size", "window", "inertia", "flow_drag_coefficient", "min_count"),
     "position_noise",
 )
@@ -52,10 +50,9 @@ def flow(
     how: RecordingOptions,
     frame_interval: FrameInterval = None,
     flow_variables: FlowVariables = None,
-    tracers: Annotated[
-        bool,
-        option("--tracers", "The bodies are passive tracers: their tracks make one flow (PTV)."),
-    ] = False,
+    tracers: bool = flag(
+        "--tracers", "The bodies are passive tracers: their tracks make one flow (PTV)."
+    ),
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:
@@ -69,6 +66,7 @@ def flow(
     """
     from driftwalk.cli.inputs.flow_file import read_flow_file
     from driftwalk.conditions import (
+        flow_by_study,
         is_stated,
         load_with_study,
         require_motion,
@@ -76,22 +74,17 @@ def flow(
         study_of_block,
         unstated_warning,
     )
-    from driftwalk.flow import save_flow
+    from driftwalk.flow import flow_from_tracers, save_flow
 
     existing = "replace" if overwrite else "error"
     measured = read_flow_file(
-        recording,
-        how,
-        frame_interval=frame_interval,
-        variables=flow_variables,
+        recording, how, frame_interval=frame_interval, variables=flow_variables
     )
     if measured is not None:
         if tracers:
             raise InputError(f"{recording} is a flow field already: --tracers is for tracks")
         save_flow(measured, out, existing=existing)
         _report_file(measured, out, json=json)
-        if not json:
-            print_next("simulate", "--flow", out, "-o", "motion.nc")
         return
     _check_given(given, tracers=tracers)
     resolved = given.study()
@@ -106,11 +99,18 @@ def flow(
             trajectory = load_with_study(recording, resolved, how.arguments())
     resolved = study_of_block(resolved, trajectory)
     if tracers:
-        field = _from_tracers(trajectory, resolved, noise=given.overrides.get(NOISE))
+        noise = given.overrides.get(NOISE)
+        field = flow_from_tracers(
+            trajectory,
+            cells=resolved.flow.cells,
+            cell_size=resolved.flow.cell_size_m,
+            position_noise=None if isinstance(noise, str) else noise,
+            min_count=resolved.flow.min_count,
+        )
     else:
         _require_one_body(trajectory, recording, body=how.body)
         require_motion(trajectory, body=how.body, where=recording)
-        field = _extract(trajectory, resolved, body=how.body)
+        field = flow_by_study(trajectory, resolved, body="all" if how.body == "all" else None)
     save_flow(field, out, existing=existing)
     _report(field, out, json=json)
     if json:
@@ -121,7 +121,7 @@ def flow(
     warning = unstated_warning(study_for([trajectory], resolved), about="block")
     print_warnings([warning])
     run = sibling(out.with_suffix(""), "run")
-    words = [*how.words(), *given.words("body_shape", "side", "mass", "depth")]
+    words = [*how.words(), *given.words(*BODY)]
     print_next("calibrate", recording, *words, "--flow", out, "-o", run)
 
 
@@ -150,37 +150,6 @@ def _require_one_body(trajectory: xr.Dataset, path: Path, *, body: str | None) -
         )
 
 
-def _from_tracers(trajectory: xr.Dataset, study: Study, *, noise: float | str | None) -> xr.Dataset:
-    from driftwalk.flow import flow_from_tracers
-
-    return flow_from_tracers(
-        trajectory,
-        cells=study.flow.cells,
-        cell_size=study.flow.cell_size_m,
-        position_noise=None if isinstance(noise, str) else noise,
-        min_count=study.flow.min_count,
-    )
-
-
-def _extract(trajectory: xr.Dataset, study: Study, *, body: str | None) -> xr.Dataset:
-    from driftwalk.flow import extract_flow
-
-    return extract_flow(
-        trajectory,
-        body="all" if body == "all" else None,
-        cells=study.flow.cells,
-        cell_size=study.flow.cell_size_m,
-        window=study.flow.smoothing_window_s,
-        inertia=study.flow.inertia,
-        mass=study.block.mass_kg,
-        side=study.block.side_m,
-        depth=study.wetted_depth_m,
-        water_density=study.water.density_kg_m3,
-        flow_drag_coefficient=study.flow.flow_drag_coefficient,
-        min_count=study.flow.min_count,
-    )
-
-
 def _report_file(field: xr.Dataset, out: Path, *, json: bool) -> None:
     """Say what was written of a file, and what to know about it."""
     from driftwalk.cli.inputs.flow_file import describe_field
@@ -196,6 +165,7 @@ def _report_file(field: xr.Dataset, out: Path, *, json: bool) -> None:
         f"wrote {out}: {facts['columns']} x {facts['rows']} nodes from a file, "
         f"{100 * facts['measured_share']:.0f} % of them measured, the rest filled or outside"
     )
+    print_next("simulate", "--flow", out, "-o", "motion.nc")
 
 
 def _report(field: xr.Dataset, out: Path, *, json: bool) -> None:

@@ -6,13 +6,12 @@ mistake answer at once.
 
 from __future__ import annotations
 
-import inspect
+import importlib
 import io
 import logging
 import os
 import sys
-from collections.abc import Callable, Sequence
-from functools import lru_cache
+from collections.abc import Sequence
 from typing import Annotated, Any, Final, NamedTuple
 
 import typer
@@ -78,8 +77,8 @@ class LazyGroup(HelpGroup):
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        for name in COMMANDS:
-            self.add_command(_one_command_app(name, _stand_in), name)
+        for name, (heading, short, _) in COMMANDS.items():
+            self.add_command(HelpCommand(name, short_help=short, rich_help_panel=heading))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command to run, imported."""
@@ -96,34 +95,12 @@ class LazyGroup(HelpGroup):
 
 def load_command(name: str) -> Any:
     """Import a command and return it in the form that the group runs."""
-    import importlib
-
     module = importlib.import_module(f"driftwalk.cli.{COMMANDS[name].module}")
     target = vars(module).get(f"{name}_app") or getattr(module, name.replace("-", "_"))
-    if isinstance(target, typer.Typer):
-        return to_click_command(target)
-    return _one_command_app(name, target)
-
-
-def _stand_in() -> None:
-    """Represent a command in the list of commands."""
-
-
-@lru_cache(maxsize=64)
-def _one_command_app(name: str, function: Callable[..., Any]) -> Any:
-    app = typer.Typer(add_completion=False)
-    heading, short = COMMANDS[name][:2]
-    text = short if function is _stand_in else paragraphs(function.__doc__ or short)
-    app.command(name, cls=HelpCommand, help=text, short_help=short, rich_help_panel=heading)(
-        function
-    )
-    return to_click_command(app)
-
-
-def paragraphs(docstring: str) -> str:
-    """Return a docstring with each paragraph on one line, for a terminal of any width to wrap."""
-    blocks = inspect.cleandoc(docstring).split("\n\n")
-    return "\n\n".join(" ".join(block.split()) for block in blocks)
+    if not isinstance(target, typer.Typer):
+        function, target = target, typer.Typer(add_completion=False)
+        target.command(name, cls=HelpCommand)(function)
+    return to_click_command(target)
 
 
 app = typer.Typer(
@@ -177,12 +154,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0
     """
     command = to_click_command(app)
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = command.main(
-            args=list(sys.argv[1:] if arguments is None else arguments),
-            prog_name="driftwalk",
-            standalone_mode=False,
-        )
+        code = command.main(args=words, prog_name="driftwalk", standalone_mode=False)
         # Output that still sits in a buffer may fail only now: a full disk, a closed pipe.
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt) as error:

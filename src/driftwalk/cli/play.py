@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_source
 from driftwalk.cli.inputs.other_files import explained
-from driftwalk.cli.options.model import KnownModel, ModelName, PlayedParameters, playable_model
-from driftwalk.cli.options.shared_types import FlowFile, Replace, Run, option
+from driftwalk.cli.options.model import KnownModel, ModelName, playable_model
+from driftwalk.cli.options.shared_types import FlowFile, Replace, Run, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.cli.view import Host, Open, Port, show
@@ -39,24 +39,19 @@ def play(
     run: Run = None,
     flow: FlowFile = None,
     model: ModelName = None,
-    parameters: PlayedParameters = None,
-    recording: Annotated[
-        Path | None, option("--recording FILE", "Recording to compare the steps with.")
-    ] = None,
-    body: Annotated[str | None, option("--body", "Body of the recording.")] = None,
-    live: Annotated[
-        int | None,
-        option(
-            "--live PORT", "Port that publishes the tank as a tracker's stream; 0 for a free port."
-        ),
-    ] = None,
-    save: Annotated[
-        Path | None,
-        option(
-            "--save FILE",
-            "Write the playground as one HTML file that runs without a server, and end.",
-        ),
-    ] = None,
+    parameters: list[str] | None = optional(
+        "--parameter NAME=VALUE|LOW,HIGH",
+        "Value to begin with, or range of the slider, of a parameter of --model; repeat for "
+        "others.",
+    ),
+    recording: Path | None = optional("--recording FILE", "Recording to compare the steps with."),
+    body: str | None = optional("--body", "Body of the recording."),
+    live: int | None = optional(
+        "--live PORT", "Port that publishes the tank as a tracker's stream; 0 for a free port."
+    ),
+    save: Path | None = optional(
+        "--save FILE", "Write the playground as one HTML file that runs without a server, and end."
+    ),
     overwrite: Replace = False,
     port: Port = 8765,
     host: Host = "127.0.0.1",
@@ -131,8 +126,7 @@ def _of_model(
     from driftwalk.conditions import study_for
     from driftwalk.viewer import ModelPlaySource
 
-    if "assembly.blocks" in source.given.overrides:
-        raise InputError("--blocks: the page of a --model has a slider for its bodies")
+    source.given.refuse(["assembly.blocks"], "the page of a --model has a slider for its bodies")
     chosen, found, beside = source.study(), source.found, None
     if found is not None:
         beside, body = _of_run(found, recording, chosen, body)
@@ -144,14 +138,9 @@ def _of_model(
     else:
         field = source.flow_for(known.model, chosen, flow)
     print_warnings(known.warnings)
+    seed = chosen.assembly.seed
     return ModelPlaySource(
-        known.model,
-        known.values,
-        chosen,
-        flow=field,
-        recording=beside,
-        body=body,
-        seed=chosen.assembly.seed,
+        known.model, known.values, chosen, flow=field, recording=beside, body=body, seed=seed
     )
 
 

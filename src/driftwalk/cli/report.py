@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from driftwalk.cli.inputs.recordings import load_simulation
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared_types import Replace, argument, option
+from driftwalk.cli.options.shared_types import Replace, argument, optional
 from driftwalk.cli.terminal.output import print_note, print_warnings, require_place
 
 
@@ -20,7 +20,7 @@ def report(
         argument("RUN...", "Run directories, finished or not, recordings, or simulations."),
     ],
     how: RecordingOptions,
-    out: Annotated[Path, option("--out -o FILE", "HTML file to write.")] = Path("report.html"),
+    out: Path = optional("--out -o FILE", "HTML file to write.", default=Path("report.html")),
     overwrite: Replace = False,
 ) -> None:
     """Write a report of runs or recordings: one HTML file that loads nothing from anywhere.

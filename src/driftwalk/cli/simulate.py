@@ -11,8 +11,16 @@ from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_s
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.model import KnownModel, ModelName, ParameterValues, known_model
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared_types import BodyOfLike, Json, Replace, Run, flow_of_run, option
-from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
+from driftwalk.cli.options.shared_types import (
+    BodyOfLike,
+    Json,
+    Replace,
+    Run,
+    flow_of_run,
+    option,
+    optional,
+)
+from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
     print_next,
@@ -42,16 +50,8 @@ OF_THE_BLOCK: Final = (
 
 @with_study_options(
     STUDY_KEYS,
-    *(
-        "tank_diameter",
-        "body_shape",
-        "side",
-        "mass",
-        "depth",
-        "drag_coefficient",
-        "force_std",
-        "force_interval",
-    ),
+    *("tank_diameter", "body_shape", "side", "mass", "depth"),
+    *("drag_coefficient", "force_std", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step", "duration", "sample_rate"),
     *("position_noise", "orientation_noise", "replicates", "seed", "flow_repeat", "flow_start"),
 )
@@ -59,31 +59,24 @@ def simulate(
     out: Annotated[Path, option("--out -o FILE.nc", "File to write.")],
     given: StudyOptions,
     run: Run = None,
-    flow: Annotated[
-        Path | None,
-        option(
-            "--flow FILE",
-            "Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
-            "For the block, and for a --model that uses it.",
-            callback=flow_of_run,
-        ),
-    ] = None,
+    flow: Path | None = optional(
+        "--flow FILE",
+        "Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
+        "For the block, and for a --model that uses it.",
+        callback=flow_of_run,
+    ),
     model: ModelName = None,
     parameters: ParameterValues = None,
-    like: Annotated[
-        Path | None,
-        option(
-            "--like RECORDING",
-            "Recording that gives start, time stamps and gaps (driftwalk's NetCDF or plain CSV).",
-        ),
-    ] = None,
+    like: Path | None = optional(
+        "--like RECORDING",
+        "Recording that gives start, time stamps and gaps (driftwalk's NetCDF or plain CSV).",
+    ),
     body: BodyOfLike = None,
-    backend: Annotated[
-        str,
-        option(
-            "--backend cpu|reference", "Backend: cpu for single, reference for double precision."
-        ),
-    ] = "cpu",
+    backend: str = optional(
+        "--backend cpu|reference",
+        "Backend: cpu for single, reference for double precision.",
+        default="cpu",
+    ),
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:
@@ -158,11 +151,10 @@ def _of_block(
         )
     else:
         field = load_flow(flow)
-    if recording is not None:
-        chosen = study_for([recording], chosen, body=body)
     if recording is None:
         result = run(chosen, field, backend="reference" if backend == "reference" else "cpu")
     else:
+        chosen = study_for([recording], chosen, body=body)
         result = simulate_like(chosen, field, recording)
     # What was refused needs no such words.
     print_warnings([] if found is None else found.warnings)
@@ -189,7 +181,9 @@ def _of_model(
     from driftwalk.conditions import study_for
     from driftwalk.motion import simulate_motion
 
-    _refuse_block(source.given)
+    of_block = ("block.", "forces.", "simulation.time_step_s")
+    about_it = [key for key in source.given.overrides if key.startswith(of_block)]
+    source.given.refuse(about_it, "about the block, which --model replaces; leave it out")
     chosen = source.study()
     if recording is not None:
         chosen = study_for([recording], chosen, body=body)
@@ -200,15 +194,6 @@ def _of_model(
     _say_what(chosen, source, about="tank")
     print_warnings(known.warnings)
     return result
-
-
-def _refuse_block(given: StudyOptions) -> None:
-    """Refuse options about the block and its force, which another model does not have."""
-    of_block = [key for key in given.overrides if key.startswith(("block.", "forces."))]
-    of_block += [key for key in given.overrides if key == "simulation.time_step_s"]
-    if of_block:
-        names = ", ".join(option_name(key, keys=given.keys) for key in of_block)
-        raise InputError(f"{names}: about the block, which --model replaces; leave it out")
 
 
 def _in_words(facts: dict[str, Any]) -> str:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from driftwalk.cli.inputs.model_source import ModelSource, load_flow_for, open_source
-from driftwalk.cli.main import paragraphs
+from driftwalk.cli.inputs.model_source import (
+    SEARCHED,
+    ModelSource,
+    given_files,
+    load_flow_for,
+    open_source,
+)
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.model import (
     KnownModel,
-    KnownParameters,
     ModelName,
     ParameterValues,
     partly_known_model,
@@ -28,9 +31,10 @@ from driftwalk.cli.options.shared_types import (
     Replace,
     Run,
     argument,
-    option,
+    flag,
+    optional,
 )
-from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
+from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -66,9 +70,7 @@ def study(ctx: typer.Context) -> None:
 @study_app.command(cls=HelpCommand)
 def new(
     path: Annotated[Path | None, argument("[FILE]", "File to write (default: -, stdout).")] = None,
-    full: Annotated[
-        bool, option("--full", "List every parameter with its unit and meaning.")
-    ] = False,
+    full: bool = flag("--full", "List every parameter with its unit and meaning."),
     overwrite: Replace = False,
 ) -> None:
     """Print a study file with what differs from tank to tank, or with --full every parameter."""
@@ -99,10 +101,6 @@ def check(path: Annotated[Path, argument("FILE", "Study file.")], json: Json = F
         print_next("fit", "RECORDING", "--study", path, "-o", "fit")
 
 
-STATED: Final = ("forces.drag_coefficient", "forces.force_std_N")
-"""Parameters with a default that count as the truth only if the file states them."""
-
-
 OF_THE_BLOCK: Final = ("recover.drag_coefficient_precision",)
 OF_A_MODEL: Final = (
     "tank.diameter_m",
@@ -119,6 +117,7 @@ Noise = Literal["estimated", "known"]
 
 
 # What --threads counts depends on the model here: it has a text of its own.
+@study_app.command(cls=HelpCommand)
 @with_options(RunOptions, "out", "cluster", "cluster_options", "overwrite", "json")
 @with_study_options(
     RECOVER_KEYS,
@@ -130,33 +129,24 @@ def recover(
     run: Run = None,
     model: ModelName = None,
     parameters: ParameterValues = None,
-    known: KnownParameters = None,
-    like: Annotated[
-        Path | None,
-        option(
-            "--like RECORDING",
-            "Recording that gives start, time stamps, gaps and camera, with --model.",
-        ),
-    ] = None,
+    known: list[str] | None = optional(
+        "--known NAME",
+        "Parameter of --model, or position_noise, that the calibrations know; repeat for others.",
+    ),
+    like: Path | None = optional(
+        "--like RECORDING",
+        "Recording that gives start, time stamps, gaps and camera, with --model.",
+    ),
     body: BodyOfLike = None,
-    sample_rate: Annotated[
-        Any,
-        option(
-            "--sample-rate",
-            "Samples per second, with --model (default: 10).",
-            unit="Hz",
-            panel=PANEL,
-        ),
-    ] = None,
-    threads: Annotated[
-        int | None,
-        option(
-            "--threads N",
-            "Recordings to fit at the same time; threads of a calibration with --model "
-            "(default: one per core).",
-            min=1,
-        ),
-    ] = None,
+    sample_rate: Any = optional(
+        "--sample-rate", "Samples per second, with --model (default: 10).", unit="Hz", panel=PANEL
+    ),
+    threads: int | None = optional(
+        "--threads N",
+        "Recordings to fit at the same time; threads of a calibration with --model "
+        "(default: one per core).",
+        min=1,
+    ),
     *,
     options: RunOptions,
 ) -> None:
@@ -174,7 +164,7 @@ def recover(
     source = open_source(run, given, model)
     method: FitRecovery | ModelRecovery
     if not source.is_block:
-        _refuse(given, OF_THE_BLOCK, "about the block, which --model replaces; leave it out")
+        given.refuse(OF_THE_BLOCK, "about the block, which --model replaces; leave it out")
         # The noise is no parameter of a model, but the recovery may be told it all the same.
         of_model = [name for name in known or () if name != NOISE]
         chosen = partly_known_model(model, parameters, run, of_model)
@@ -182,7 +172,7 @@ def recover(
         method, inputs = _of_model(chosen, source, sample_rate, like, body, noise)
         print_warnings(chosen.warnings)
     else:
-        _refuse(given, OF_A_MODEL, "belongs to a --model; for the block it stands in --study FILE")
+        given.refuse(OF_A_MODEL, "belongs to a --model; for the block it stands in --study FILE")
         beside = {
             "--parameter": parameters, "--known": known,
             "--like": like, "--body": body, "--sample-rate": sample_rate,
@@ -209,7 +199,7 @@ def _of_model(
     given, recording = source.given, None
     if like is not None:
         recording = RecordingOptions(body=body).load(like)
-        _refuse(given, ("recover.durations_s",), "given by the recording of --like")
+        given.refuse(["recover.durations_s"], "given by the recording of --like")
         if sample_rate is not None:
             raise ConfigurationError("--sample-rate: given by the recording of --like")
     elif body is not None:
@@ -236,35 +226,41 @@ def _of_model(
     else:
         field, flow_file = _named_flow(study, given)
     parameters = None if found is None else found.file
-    inputs = {"truth": given.file, "parameters": parameters, "like": like, "flow": flow_file}
+    inputs = given_files(truth=given.file, parameters=parameters, like=like, flow=flow_file)
     method = ModelRecovery(study, chosen.model, chosen.values, field, recording, body, noise)
-    return method, _files(inputs)
+    return method, inputs
 
 
 def _of_block(source: ModelSource) -> tuple[FitRecovery, dict[str, Path]]:
     """Return a block of known truth, and the files that were read."""
+    from driftwalk.conditions import is_stated
     from driftwalk.likelihood import FitRecovery
 
     given = source.given
     if source.found is not None:
-        study, field, inputs = _of_run(source.found, source)
-        return FitRecovery(study, field), inputs
+        return _of_run(source.found, source)
     if given.file is None:
         raise ConfigurationError(
             "the truth is missing: give a finished run, a study file of the block (--study FILE), "
             "or a motion model with its values (--model NAME --parameter NAME=VALUE)"
         )
     study = given.study()
-    _require_stated(given.file)
+    for name in SEARCHED:
+        # A default is no true value.
+        if not is_stated(study, name):
+            section, _, key = name.partition(".")
+            raise ConfigurationError(
+                f"{given.file}: the truth lacks [{section}] {key}: give the true value, a "
+                "fitted one or a guess"
+            )
     field, flow_file = _named_flow(study, given)
-    return FitRecovery(study, field), _files({"truth": given.file, "flow": flow_file})
+    return FitRecovery(study, field), given_files(truth=given.file, flow=flow_file)
 
 
-def _of_run(
-    found: FoundRun, source: ModelSource
-) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
-    """Return the truth that a run has found: its study with its camera and options; flow, files."""
+def _of_run(found: FoundRun, source: ModelSource) -> tuple[FitRecovery, dict[str, Path]]:
+    """Return the truth that a run has found, its study with its camera and options; its files."""
     from driftwalk.conditions import study_as_seen
+    from driftwalk.likelihood import FitRecovery
     from driftwalk.schema import body_track
 
     given, own = source.given, found.block_study()
@@ -275,9 +271,9 @@ def _of_run(
     if RECOVER_KEYS["flow"] not in given.overrides:
         mean, lacks = found.mean_flow(own)
         print_warnings([lacks])
-        return study, mean, found.inputs
+        return FitRecovery(study, mean), found.inputs
     field, flow_file = _named_flow(study, given)
-    return study, field, {**found.inputs, **_files({"flow": flow_file})}
+    return FitRecovery(study, field), found.inputs | given_files(flow=flow_file)
 
 
 def _named_flow(study: Study, given: StudyOptions) -> tuple[xr.Dataset | None, Path | None]:
@@ -289,31 +285,3 @@ def _named_flow(study: Study, given: StudyOptions) -> tuple[xr.Dataset | None, P
     if given.file is not None and RECOVER_KEYS["flow"] not in given.overrides:
         path = given.file.parent / named
     return load_flow_for(path, study), path
-
-
-def _files(roles: dict[str, Path | None]) -> dict[str, Path]:
-    """Return the files that were given, by their role."""
-    return {role: path for role, path in roles.items() if path is not None}
-
-
-def _refuse(given: StudyOptions, keys: Sequence[str], why: str) -> None:
-    names = [option_name(key, keys=given.keys) for key in keys if key in given.overrides]
-    if names:
-        raise ConfigurationError(f"{', '.join(names)}: {why}")
-
-
-def _require_stated(path: Path) -> None:
-    """Refuse a file in which a true value is only a default."""
-    from driftwalk.model import load_study
-
-    study = load_study(path)
-    for name in STATED:
-        section, _, key = name.partition(".")
-        if key not in getattr(study, section).model_fields_set:
-            raise ConfigurationError(
-                f"{path}: the truth lacks [{section}] {key}: give the true value, a "
-                "fitted one or a guess"
-            )
-
-
-study_app.command("recover", cls=HelpCommand, help=paragraphs(recover.__doc__ or ""))(recover)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -50,6 +49,9 @@ def view(
 
 def show(source: Source, *, host: str, port: int, open: bool | None) -> None:
     """Serve a page, say where it is, and open the browser if that is wanted."""
+    import threading
+    import webbrowser
+
     from driftwalk.viewer import serve
 
     wanted = sys.stdout.isatty() if open is None else open
@@ -64,18 +66,10 @@ def show(source: Source, *, host: str, port: int, open: bool | None) -> None:
             )
         print_note("Ctrl-C ends it")
         if wanted:
-            open_browser(address)
+            # In a thread of its own: some systems wait until the browser is closed.
+            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
     serve(source, host=host, port=port, ready=ready)
-
-
-def open_browser(address: str, opener: Callable[[str], bool] | None = None) -> None:
-    """Open the browser in a separate thread: some systems wait until it is closed."""
-    import threading
-    import webbrowser
-
-    target = webbrowser.open if opener is None else opener
-    threading.Thread(target=target, args=(address,), daemon=True).start()
 
 
 def address_of(text: str) -> tuple[str, int] | None:

@@ -112,9 +112,7 @@ def plan_aspects(time: npt.ArrayLike, *, step_interval: float | None = None) -> 
     unbroken = np.ones(count, dtype=bool)
     for k in range(ASPECT_POLICY.later + 1):
         unbroken &= follows[k : k + count]
-    weight = short.weight
-    right = np.minimum(short.left + (weight > 0.0), stamps.size - 1)
-    point_time = (1.0 - weight) * stamps[short.left] + weight * stamps[right]
+    point_time = resampled(short, stamps)
     return AspectPlan(
         short, tuple(longer), np.flatnonzero(follows), np.flatnonzero(unbroken), point_time
     )
@@ -189,12 +187,11 @@ def form_aspects(
 
 def _steps(name: str, plan: StepPlan, x: Floats, y: Floats) -> Aspect:
     found = apply_steps(plan, x, y)
-    points = np.column_stack([found.step_length, found.turning_angle])
-    return Aspect(name, np.ascontiguousarray(points), plan.time[found.pair])
+    return _aspect(name, found.step_length, found.turning_angle, plan.time[found.pair])
 
 
 def resampled(plan: StepPlan, values: npt.ArrayLike) -> Floats:
-    """Return the resampled positions [m]."""
+    """Return what a series has at the points of a plan, such as positions [m]."""
     taken = np.asarray(values, dtype=np.float64)
     right = np.where(plan.weight > 0.0, plan.left + 1, plan.left)
     return np.asarray((1.0 - plan.weight) * taken[plan.left] + plan.weight * taken[right])

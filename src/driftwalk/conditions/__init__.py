@@ -15,6 +15,7 @@ from driftwalk.conditions.reading import (
 from driftwalk.conditions.recorded import (
     Conditions,
     Neighbours,
+    flow_by_study,
     neighbours_of,
     recorded_conditions,
     recorded_start,
@@ -48,6 +49,7 @@ __all__ = [
     "ReadRecordings",
     "block_attributes",
     "estimated_study",
+    "flow_by_study",
     "is_stated",
     "jump_warnings",
     "load_for_run",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -143,10 +143,40 @@ def recording_flow(recording: xr.Dataset, study: Study, *, body: str | None = No
 
 def flow_from_track(track: Track, study: Study) -> xr.Dataset:
     """Return the flow field of one track; see `recording_flow`."""
+    return flow_by_study(build_trajectory(*track), study, arena=study.tank.to_arena())
+
+
+def flow_by_study(
+    trajectory: xr.Dataset,
+    study: Study,
+    *,
+    body: str | None = None,
+    arena: dict[str, Any] | None = None,
+) -> xr.Dataset:
+    """Return the flow field of a trajectory, with the block, the water and [flow] of a study.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A `trajectory`.
+    study : Study
+        Block, water and the section [flow].
+    body : str, optional
+        The body where there are several, or "all" of them.
+    arena : dict, optional
+        The tank; default: the one that the trajectory states.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> int(dw.conditions.flow_by_study(dw.tank30_recording(), dw.Study()).sizes["x"])
+    50
+    """
     settings = study.flow
     return extract_flow(
-        build_trajectory(track.time, track.x, track.y, track.theta),
-        arena=study.tank.to_arena(),
+        trajectory,
+        body=body,
+        arena=arena,
         cells=settings.cells,
         cell_size=settings.cell_size_m,
         window=settings.smoothing_window_s,

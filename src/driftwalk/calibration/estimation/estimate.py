@@ -152,17 +152,16 @@ def find_optima(
     *,
     order: Order,
     seed: int,
-    no_restart_above: float = MATCHING.no_restart_above,
     give_up: float = np.inf,
 ) -> list[LocalOptimum]:
     """Return the ends of the searches that are worth a posterior, the most likely first.
 
-    The arguments are as of `match_summaries`, with two limits on the discrepancy in summaries:
-    above `no_restart_above` no other start is tried, and above `give_up` a search is given up (see
-    `minimise_discrepancy`). The first search begins where a regression puts the parameters. Even
-    where its errors are large, its centre is closer to the truth than they say: they come mostly
-    from settings that move unlike the recording. Where the end does not match, the model has more
-    than one place to look, and an end that matches may not be the best that does.
+    The arguments are as of `match_summaries`, with a limit on the discrepancy in summaries: above
+    it a search is given up (see `minimise_discrepancy`), and no other start is tried. The first
+    search begins where a regression puts the parameters. Even where its errors are large, its
+    centre is closer to the truth than they say: they come mostly from settings that move unlike the
+    recording. Where the end does not match, the model has more than one place to look, and an end
+    that matches may not be the best that does.
     """
     recorded = objective.recorded[0]
     regression = sequential_regression(
@@ -176,7 +175,8 @@ def find_optima(
         )
 
     found = [search(1, regression.centre, width)]
-    if found[0].discrepancy < MATCHING.matches or found[0].discrepancy > no_restart_above:
+    hopeless = min(give_up, MATCHING.no_restart_above)
+    if found[0].discrepancy < MATCHING.matches or found[0].discrepancy > hopeless:
         return found
     wide = np.full(parameters, GAUSS_NEWTON.widest)
     further = islice(distinct(order(starts()), MATCHING.apart), MATCHING.most_starts)
@@ -202,12 +202,9 @@ def _profiles(
     setting = posterior.solution.setting
     if not np.array_equal(order(setting[None])[0], setting):
         return None
+    std = wider * posterior.sample.std(axis=0)
     found = discrepancy_profiles(
-        posterior.emulator,
-        recorded,
-        posterior.solution,
-        wider * posterior.sample.std(axis=0),
-        reach=GAUSS_NEWTON.reach,
+        posterior.emulator, recorded, posterior.solution, std, reach=GAUSS_NEWTON.reach
     )
     place = np.clip(found.place - bias[:, None], 0.0, 1.0)
     return Profiles(place, found.rise / wider[:, None] ** 2)

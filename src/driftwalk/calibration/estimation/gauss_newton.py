@@ -143,13 +143,9 @@ def simulations_of(parameters: int) -> tuple[int, int]:
     ((256, 512), (256, 1024))
     """
     coefficients = 1 + 2 * parameters + parameters * (parameters - 1) // 2
-    least = (
-        max(each * coefficients, fewest)
-        for each, fewest in zip(
-            GAUSS_NEWTON.per_coefficient, GAUSS_NEWTON.fewest_simulations, strict=True
-        )
-    )
-    first, last = (2 ** int(np.ceil(np.log2(one))) for one in least)
+    each = coefficients * np.array(GAUSS_NEWTON.per_coefficient)
+    least = np.maximum(each, GAUSS_NEWTON.fewest_simulations)
+    first, last = (2 ** int(power) for power in np.ceil(np.log2(least)))
     return first, last
 
 

@@ -237,21 +237,18 @@ def build_model_calibration(
         unable.append(ended)
     verdict = verdict_of(against, unable)
     count = len(ranges)
-    # None where the summaries' answer does not count: nothing is known of the intervals then.
-    known = found.known
+    # Where the summaries' answer does not count, nothing is known of the intervals.
+    known = found.known or Determination(
+        np.full((count, 2), np.nan), np.full(count, np.nan), np.zeros(count, dtype=bool)
+    )
     about, named = recording_parts(motion), parameter_parts(ranges)
     data: dict[str, Any] = {
         **about.data,
         **named.data,
         "estimate": ("parameter", _values(entry, found.point[None])[0]),
-        "interval": (
-            ("parameter", "bound"),
-            np.full((count, 2), np.nan) if known is None else known.interval,
-        ),
-        "determined": (
-            "parameter", np.zeros(count, dtype=bool) if known is None else known.determined,
-        ),
-        "half_width": ("parameter", np.full(count, np.nan) if known is None else known.half_width),
+        "interval": (("parameter", "bound"), known.interval),
+        "determined": ("parameter", known.determined),
+        "half_width": ("parameter", known.half_width),
         "range": (("parameter", "bound"), np.array([(one.low, one.high) for one in ranges])),
         "held_out_distance": ("aspect", held_out.held),
         "trained_distance": ("aspect", held_out.trained),
@@ -262,17 +259,13 @@ def build_model_calibration(
         "score_std": ((), held_out.score_std),
         **verdict_variables(verdict),
         **_stages(found, entry),
-    }  # fmt: skip
+    }
     series = series_warnings(motion.like.flow, duration=motion.duration)
     said = [*warnings, *_said(found, entry), *series]
-    coords: dict[str, Any] = {
-        **named.coords,
-        **about.coords,
-        "warning": ("warning", texts(said)),
-    }
+    coords = {**named.coords, **about.coords, "warning": ("warning", texts(said))}
     attrs: dict[str, Any] = {
         "model": entry.model.name,
-        "estimate_from": "search" if known is None else "summaries",
+        "estimate_from": "search" if found.known is None else "summaries",
         "fixed": json.dumps(_fixed(entry)),
         "confidence": motion.study.calibration.confidence,
         "position_noise_m": motion.like.camera.position_noise,

@@ -124,16 +124,6 @@ def series_of(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Series:
     )  # fmt: skip
 
 
-def turns_of(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> list[tuple[Floats, Floats]]:
-    """Return step lengths [m] and turning angles [rad] at each interval."""
-    found = []
-    for one, counts in zip(plan.intervals, plan.pair_counts, strict=True):
-        steps = apply_steps(one, np.asarray(x), np.asarray(y))
-        chosen = counts[steps.pair]
-        found.append((steps.step_length[chosen], steps.turning_angle[chosen]))
-    return found
-
-
 Numbers = Iterator[float]
 
 
@@ -191,7 +181,8 @@ def summarise(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
     if np.count_nonzero(one.there) < SUMMARIES.fewest:
         return np.zeros(count_summaries(plan))
     numbers = [
-        *_step_lengths(one),
+        # Of the logarithm of the step lengths.
+        *np.quantile(one.log_length[one.there], SUMMARIES.step_quantiles),
         *_turns(plan, x, y),
         *_changes(one),
         *_memory(one),
@@ -222,14 +213,12 @@ def _mean(values: Floats, chosen: Bools) -> float:
     return float(values[chosen].mean()) if np.count_nonzero(chosen) >= SUMMARIES.fewest else 0.0
 
 
-def _step_lengths(one: Series) -> Numbers:
-    """Yield quantiles of the logarithm of the step lengths."""
-    yield from np.quantile(one.log_length[one.there], SUMMARIES.step_quantiles)
-
-
 def _turns(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Numbers:
     """Yield how bodies turn over each interval, and how far they get over the longer ones."""
-    for index, (length, angle) in enumerate(turns_of(plan, x, y)):
+    for index, (one, counts) in enumerate(zip(plan.intervals, plan.pair_counts, strict=True)):
+        steps = apply_steps(one, x, y)
+        chosen = counts[steps.pair]
+        length, angle = steps.step_length[chosen], steps.turning_angle[chosen]
         cos = np.cos(angle)
         all_of = np.ones(angle.size, dtype=bool)
         fast = length > np.median(length) if length.size else all_of
@@ -251,12 +240,8 @@ def _changes(one: Series) -> Numbers:
     change = np.where(pair, one.log_length[1:] - one.log_length[:-1], 0.0)
     product = np.maximum(one.length[1:] * one.length[:-1], 1e-300)
     cos = (one.dx[1:] * one.dx[:-1] + one.dy[1:] * one.dy[:-1]) / product
-    kinds = (
-        change > SUMMARIES.faster,
-        change < -SUMMARIES.faster,
-        np.abs(change) < SUMMARIES.steady,
-    )
-    for kind in kinds:
+    faster = SUMMARIES.faster
+    for kind in (change > faster, change < -faster, np.abs(change) < SUMMARIES.steady):
         yield float((kind & pair).sum()) / max(float(pair.sum()), 1.0)
         yield _mean(cos, kind & pair)
     enough = np.count_nonzero(pair) >= SUMMARIES.fewest

@@ -148,9 +148,7 @@ class LocalEmulator:
         def slope(place: Floats) -> Floats:
             return np.asarray(self.coefficients @ _basis_slope(place, self.form))
 
-        begin = np.zeros(self.centre.size)
-        if start is not None:
-            begin = (start - self.centre) / self.width
+        begin = np.zeros(low.size) if start is None else (start - self.centre) / self.width
         inside = 1e-6 * (high - low)
         if held is not None:
             # A range that is next to nothing: the solver takes no bounds that are equal.
@@ -158,13 +156,8 @@ class LocalEmulator:
             place = (value - self.centre[index]) / self.width[index]
             low[index], high[index] = place - 1e-9, place + 1e-9
             inside[index] = 0.5e-9
-        found = least_squares(
-            left,
-            np.clip(begin, low + inside, high - inside),
-            jac=slope,
-            bounds=(low, high),
-            max_nfev=40,
-        )
+        begin = np.clip(begin, low + inside, high - inside)
+        found = least_squares(left, begin, jac=slope, bounds=(low, high), max_nfev=40)
         # A trust region as wide as its standard deviation keeps the inverse finite.
         slopes = slope(found.x)
         curvature = slopes.T @ slopes + np.eye(begin.size)
@@ -217,9 +210,8 @@ def _best_form(place: Floats, summaries: Floats) -> Form:
     256 simulations their errors are larger than what they describe.
     """
     # Fewer than four simulations for each coefficient determine none of them well.
-    tried = [one for one in FORMS if len(place) >= 4 * _basis(place[:1], one).shape[1]] or [
-        FORMS[0]
-    ]
+    known = [one for one in FORMS if len(place) >= 4 * _basis(place[:1], one).shape[1]]
+    tried = known or FORMS[:1]
     errors = [_foretold(_basis(place, one), summaries) for one in tried]
     return tried[int(np.argmin(errors))]
 

@@ -131,12 +131,8 @@ def build_surface(problem: Problem, refined: RefinedMap) -> StoredSurface:
     retained = (height <= BOOTSTRAP.retained_floors) & supported
     cells = np.flatnonzero(simulated)
     settings = [values.ravel()[cells] for values in np.meshgrid(*axes, indexing="ij")]
-    replicates, _ = simulated_steps(
-        problem,
-        [np.tile(values, BOOTSTRAP.surface_replicates) for values in settings],
-        stage="surface",
-        replicates=1,
-    )
+    repeated = [np.tile(values, BOOTSTRAP.surface_replicates) for values in settings]
+    replicates, _ = simulated_steps(problem, repeated, stage="surface", replicates=1)
     return StoredSurface(
         lattice,
         retained,
@@ -228,17 +224,10 @@ def run_bootstrap(
     units = grid(recording=np.arange(count)).units(BOOTSTRAP.recordings_per_unit)
     estimates = run_sweep(function, units, store=store, executor=executor, progress=progress)
     few = min(BOOTSTRAP.floor_references, count // 2)
-    among = problem.statistic.matrix(
-        recordings.rows(slice(0, few)),
-        recordings.rows(slice(few, count)),
-        threads=problem.like.threads,
-    )
-    return Bootstrap(
-        np.column_stack([estimates[name] for name in names]),
-        estimates["excess"],
-        to_recording,
-        among,
-    )
+    first, rest = recordings.rows(slice(0, few)), recordings.rows(slice(few, count))
+    among = problem.statistic.matrix(first, rest, threads=problem.like.threads)
+    points = np.column_stack([estimates[name] for name in names])
+    return Bootstrap(points, estimates["excess"], to_recording, among)
 
 
 @dataclass(frozen=True, eq=False)

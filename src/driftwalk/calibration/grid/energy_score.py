@@ -147,9 +147,7 @@ def _fit_row(x: float, rest: Sequence[Floats], cells: Sequence[Floats], weights:
     points = rest[0].size if rest else 1
     away = [np.broadcast_to(first - x, (points, first.size))]
     away += [cell - at[:, None] for cell, at in zip(others, rest, strict=True)]
-    squares = away[0] ** 2
-    for one in away[1:]:
-        squares = squares + one**2
+    squares = sum((one**2 for one in away[1:]), start=away[0] ** 2)
     weight = weights[near] * np.clip(1.0 - squares / REACH**2, 0.0, None) ** 3
     products = [a * b for a, b in combinations_with_replacement(away, 2)]
     terms = np.stack([np.ones_like(away[0]), *away, *products], axis=-1)

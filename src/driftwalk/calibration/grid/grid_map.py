@@ -148,24 +148,18 @@ class MapSimulator:
         """Simulate some settings of a design in work units of equal work."""
         problem = self.problem
         count = len(replicates)
+        work = count * problem.duration / problem.study.time_step_s
         # Fewer than 64 worlds leave lanes empty, and each then takes longer.
-        size = settings_per_unit(
-            cells.size,
-            count * problem.duration / problem.study.time_step_s,
-            multiple=max(64 // count, 1),
-        )
+        size = settings_per_unit(cells.size, work, multiple=max(64 // count, 1))
         settings = {name: values[cells] for name, values in design.settings().items()}
         if self.executor is not None:
             problem = replace(problem, like=replace(problem.like, threads=1))
         # A single replicate has none to be apart from.
         apart = self.apart and count > 1
         function = _Cells(problem, self.stage, cells, replicates, self.details, apart)
+        units = work_units(settings, size)
         return run_sweep(
-            function,
-            work_units(settings, size),
-            store=store,
-            executor=self.executor,
-            progress=self.progress,
+            function, units, store=store, executor=self.executor, progress=self.progress
         )
 
     def _design(self, axes: Sequence[npt.ArrayLike]) -> Design:

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.calibration.grid.energy_score import EnergyScore, at_settings, smooth_energy_score
-from driftwalk.calibration.grid.grid_map import Map
+from driftwalk.calibration.grid.grid_map import Map, MapSimulator
 from driftwalk.calibration.problem import Axes
-from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.arrays import Floats
 
 Window = tuple[tuple[float, float], ...]
 """Both ends along each parameter, in its coordinate."""
@@ -66,16 +66,6 @@ class RefinementPolicy(NamedTuple):
 REFINEMENT: Final = RefinementPolicy()
 
 
-class Maps(Protocol):
-    """The simulation of the windows of a refinement."""
-
-    def full(self, axes: Axes, replicates: int) -> Map:
-        """Simulate every setting of a grid."""
-
-    def more(self, found: Map, chosen: Bools, replicates: int) -> Map:
-        """Give some settings of a map more replicates."""
-
-
 class RefinedMap(NamedTuple):
     """A refined map with its surface."""
 
@@ -100,7 +90,7 @@ def first_window(coarse: Map, margin: float) -> Window:
     )
 
 
-def locate_minimum(maps: Maps, window: Window, limits: Window) -> RefinedMap:
+def locate_minimum(maps: MapSimulator, window: Window, limits: Window) -> RefinedMap:
     """Close in on the valley, from a window that holds part of it."""
     seen = set()
     for _ in range(REFINEMENT.most_windows):
@@ -117,13 +107,8 @@ def locate_minimum(maps: Maps, window: Window, limits: Window) -> RefinedMap:
 
 def refined(found: Map, window: Window, limits: Window) -> RefinedMap:
     """Return a map with its surface and the extent of its plausible settings."""
-    widths = tuple(
-        max(
-            REFINEMENT.bandwidth_steps * _step(axis),
-            REFINEMENT.bandwidth_share * float(np.ptp(axis)),
-        )
-        for axis in found.axes
-    )
+    steps, share = REFINEMENT.bandwidth_steps, REFINEMENT.bandwidth_share
+    widths = tuple(max(steps * _step(axis), share * float(np.ptp(axis))) for axis in found.axes)
     energy_score = smooth_energy_score(found, widths)
     return RefinedMap(found, energy_score, widths, window, _plausible(energy_score, limits))
 
@@ -143,12 +128,11 @@ def _plausible(energy_score: EnergyScore, limits: Window) -> Window:
         energy_score.smoother.axes, inside.min(axis=0), inside.max(axis=0), limits, strict=True
     ):
         slack = 1e-6 * float(np.ptp(axis))
-        cut = (
-            low == 0 and axis[0] - ends[0] > slack,
-            (high == axis.size - 1 and ends[1] - axis[-1] > slack),
-        )
-        bounds.append((-math.inf if cut[0] else axis[low], math.inf if cut[1] else axis[high]))
-    return tuple((float(low), float(high)) for low, high in bounds)
+        cut_below = low == 0 and axis[0] - ends[0] > slack
+        cut_above = high == axis.size - 1 and ends[1] - axis[-1] > slack
+        first = -math.inf if cut_below else float(axis[low])
+        bounds.append((first, math.inf if cut_above else float(axis[high])))
+    return tuple(bounds)
 
 
 def better_cell(found: Map, energy_score: EnergyScore) -> tuple[int, ...] | None:
@@ -241,7 +225,7 @@ def round_step(step: float) -> float:
 
 
 def refine(
-    maps: Maps, located: RefinedMap, limits: Window, steps: Sequence[float], wanted: int
+    maps: MapSimulator, located: RefinedMap, limits: Window, steps: Sequence[float], wanted: int
 ) -> RefinedMap:
     """Give the located window the replicates that are wanted, where the optimum could be."""
     found = located

@@ -108,13 +108,10 @@ class GridCalibration:
         raise InputError(no_numbers(self.problem.model.name, setting))
 
     def _maps(self, stage: str, share_of: Callable[[Sequence[float]], float]) -> MapSimulator:
-        progress = SweepProgress(partial(self._how.tell, stage), share_of)
+        how = self._how
+        progress = SweepProgress(partial(how.tell, stage), share_of)
         return MapSimulator(
-            self.problem,
-            stage,
-            stores=self._how.stores,
-            executor=self._how.executor,
-            progress=progress,
+            self.problem, stage, stores=how.stores, executor=how.executor, progress=progress
         )
 
     def _refine(self, wanted: int) -> None:

@@ -118,15 +118,11 @@ class HiddenMarkovWalk(Baseline):
         state[:, 0] = _chosen(begin[None], chance[:, 0])
         for k in range(1, count):
             state[:, k] = _chosen(moves[state[:, k - 1]], chance[:, k])
-        rows = zip(random.generators, state, strict=True)
-        drawn = [
-            (
-                one.gamma(walk.shape[row], walk.scale[row]),
-                one.vonmises(walk.direction[row], walk.concentration[row]),
-            )
-            for one, row in rows
-        ]
-        return np.array([length for length, _ in drawn]), np.array([turn for _, turn in drawn])
+        length, turn = np.empty(state.shape), np.empty(state.shape)
+        for world, (one, row) in enumerate(zip(random.generators, state, strict=True)):
+            length[world] = one.gamma(walk.shape[row], walk.scale[row])
+            turn[world] = one.vonmises(walk.direction[row], walk.concentration[row])
+        return length, turn
 
 
 def runs_of(steps: Aspect, interval: float) -> list[Floats]:
@@ -220,11 +216,10 @@ def resampling_baselines(motion: RecordedMotion) -> list[Candidate]:
     (steps,), _ = interleaved([motion.steps], duration=motion.duration)
     interval = motion.plan.short.step_interval
     hidden = fit_hidden_markov_model(runs_of(steps, interval))
+    walk = HiddenMarkovWalk(hidden, interval)
     return [
         Candidate(ResampledSteps(steps.points, interval), motion.like, (), 0, baseline=True),
-        Candidate(
-            HiddenMarkovWalk(hidden, interval), motion.like, (), hidden.parameters, baseline=True
-        ),
+        Candidate(walk, motion.like, (), hidden.parameters, baseline=True),
     ]
 
 

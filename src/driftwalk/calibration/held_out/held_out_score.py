@@ -37,9 +37,9 @@ class HeldOutScore(NamedTuple):
     """The same without each of the odd blocks, shape (blocks / 2,)."""
     checks: Floats
     """Facts that are not fitted, of each world, shape (worlds, checks)."""
-    optimum_scores: Floats
+    optimum_scores: Floats = np.empty(0)
     """Scores at the ends of the searches."""
-    evaluations: int
+    evaluations: int = 0
 
     @property
     def score_std(self) -> float:
@@ -105,8 +105,6 @@ def score_setting(
             [float(part.overall(distances(part)).mean()) for part in motion.without_each_block]
         ),
         checks=np.array([motion.checks(x, y) for x, y in zip(seen.x, seen.y, strict=True)]),
-        optimum_scores=np.empty(0),
-        evaluations=0,
     )
 
 
@@ -179,12 +177,9 @@ def checks_off(replicates: Floats, recorded: Floats) -> Bools:
     """Return which facts of a recording are far beyond all replicates, shape (checks,)."""
     low, high = replicates.min(axis=0), replicates.max(axis=0)
     share = np.array([name.endswith("_share") for name in CHECKS])
-    lowest = np.where(
-        share, low - HELD_OUT_VERDICT.most_share_apart, low / HELD_OUT_VERDICT.most_ratio
-    )
-    highest = np.where(
-        share, high + HELD_OUT_VERDICT.most_share_apart, high * HELD_OUT_VERDICT.most_ratio
-    )
+    apart, ratio = HELD_OUT_VERDICT.most_share_apart, HELD_OUT_VERDICT.most_ratio
+    lowest = np.where(share, low - apart, low / ratio)
+    highest = np.where(share, high + apart, high * ratio)
     with np.errstate(invalid="ignore"):
         near = (lowest <= recorded) & (recorded <= highest)
     return np.asarray(np.isfinite(recorded) & ~near)

@@ -99,9 +99,7 @@ def _first(steps: Floats, states: int) -> HiddenMarkovModel:
         weights[part, state] = 1.0
     stay = np.full((states, states), 0.1 / max(states - 1, 1))
     np.fill_diagonal(stay, 0.9)
-    return _of_steps(steps, weights + 1e-3)._replace(
-        begin=np.full(states, 1.0 / states), transition=stay
-    )
+    return _of_steps(steps, weights + 1e-3, np.full(states, 1.0 / states), stay)
 
 
 def _expected(walk: HiddenMarkovModel, steps: Floats, there: Bools) -> tuple[Floats, Floats, float]:
@@ -139,25 +137,24 @@ def _expected(walk: HiddenMarkovModel, steps: Floats, there: Bools) -> tuple[Flo
 def _most_likely(steps: Floats, there: Bools, state: Floats, joint: Floats) -> HiddenMarkovModel:
     begin = state[:, 0].mean(axis=0) + LEAST_PROBABILITY
     moves = joint + LEAST_PROBABILITY
-    return _of_steps(steps[there], state[there])._replace(
-        begin=begin / begin.sum(), transition=moves / moves.sum(axis=1, keepdims=True)
-    )
+    moves /= moves.sum(axis=1, keepdims=True)
+    return _of_steps(steps[there], state[there], begin / begin.sum(), moves)
 
 
-def _of_steps(steps: Floats, weights: Floats) -> HiddenMarkovModel:
-    """Return the distributions that are most likely for steps that belong to states in parts."""
-    total = weights.sum(axis=0)
-    share = weights / total
+def _of_steps(
+    steps: Floats, weights: Floats, begin: Floats, transition: Floats
+) -> HiddenMarkovModel:
+    """Return the walk that is most likely for steps that belong to states in parts."""
+    share = weights / weights.sum(axis=0)
     length = steps[:, 0]
     mean = share.T @ length
     shape = _gamma_shape(np.log(mean) - share.T @ np.log(length))
     along, across = share.T @ np.cos(steps[:, 1]), share.T @ np.sin(steps[:, 1])
     concentration = _concentration(np.hypot(along, across))
-    none = np.zeros(total.size)
+    direction = np.arctan2(across, along)
     return HiddenMarkovModel(
-        none, np.zeros((total.size, total.size)), shape, mean / shape, np.arctan2(across, along),
-        concentration, -np.inf,
-    )  # fmt: skip
+        begin, transition, shape, mean / shape, direction, concentration, -np.inf
+    )
 
 
 def _gamma_shape(spread: Floats) -> Floats:

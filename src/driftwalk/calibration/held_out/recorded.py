@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import compress
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -276,16 +277,12 @@ class RecordedMotion:
         """The odd blocks without each of them, over the same floors."""
         found = []
         for block in range(1, ASPECT_POLICY.blocks, 2):
-            left = [
-                one.within(block_of(one.time, self.duration) != block).points
-                for one in self.held_aspects
-            ]
-            # After long gaps one block may have all the points.
-            natives = tuple(
-                KsReference(points if len(points) else one.points)
-                for points, one in zip(left, self.held_aspects, strict=True)
-            )
-            found.append(AspectReference(self.held.names, self.held.floor, natives))
+            natives = []
+            for one in self.held_aspects:
+                left = one.within(block_of(one.time, self.duration) != block).points
+                # After long gaps one block may have all the points.
+                natives.append(KsReference(left if len(left) else one.points))
+            found.append(AspectReference(self.held.names, self.held.floor, tuple(natives)))
         return tuple(found)
 
     @cached_property
@@ -384,15 +381,11 @@ def body_motion(
     duration = float(track.time[-1])
     even, odd = interleaved(aspects, duration=duration)
     # What one part hardly shows cannot be judged on it.
-    shown = [min(len(one.points), len(other.points)) for one, other in zip(even, odd, strict=True)]
-    even, odd = (
-        [
-            one
-            for one, points in zip(part, shown, strict=True)
-            if points >= ASPECT_POLICY.fewest_points
-        ]
-        for part in (even, odd)
-    )
+    shown = [
+        min(len(one.points), len(other.points)) >= ASPECT_POLICY.fewest_points
+        for one, other in zip(even, odd, strict=True)
+    ]
+    even, odd = (list(compress(part, shown)) for part in (even, odd))
     if not even or even[0].name != "steps":
         raise InputError(
             "one half of the recording's blocks of time has fewer than "

@@ -56,6 +56,9 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
+Tell = Callable[[int, int, str], None]
+
+
 def runs_in_threads(entry: Candidate) -> bool:
     """Return whether several threads may simulate a model: of a user's own that is unknown."""
     return entry.baseline or isinstance(entry.model, BlockModel | ParticleModel)
@@ -86,8 +89,10 @@ class SearchProgress:
         Of the models.
     costs : sequence of int
         Settings that each simulates at most.
+    done : list of int
+        Settings of each that are done already.
     tell : callable
-        Called with the settings done, in all, and the models under way.
+        Called with the settings done, all of them, and the models under way.
 
     Attributes
     ----------
@@ -96,18 +101,12 @@ class SearchProgress:
     """
 
     def __init__(
-        self, names: Sequence[str], costs: Sequence[int], tell: Callable[[int, str], None]
+        self, names: Sequence[str], costs: Sequence[int], done: list[int], tell: Tell
     ) -> None:
-        self._names, self._costs, self._tell = names, costs, tell
-        self._done = [0] * len(names)
+        self._names, self._costs, self._done, self._tell = names, costs, done, tell
         self._under_way: set[int] = set()
         self._lock = Lock()
         self.cancellation = CancelOnError()
-
-    def finished(self, indices: Sequence[int]) -> None:
-        """Hear which models were searched before."""
-        for index in indices:
-            self._done[index] = self._costs[index]
 
     def __call__(self, index: int, done: int) -> None:
         """Hear how many settings of a model are done; all of them when it is finished."""
@@ -119,10 +118,9 @@ class SearchProgress:
             else:
                 self._under_way.discard(index)
             names = ", ".join(self._names[k] for k in sorted(self._under_way))
-            self._tell(sum(self._done), names or self._names[index])
+            self._tell(sum(self._done), sum(self._costs), names or self._names[index])
 
 
-Tell = Callable[[int, int, str], None]
 Finished = Callable[[str, float, float, int], None]
 """Hears of a model that was judged: its name, its score, the standard error of that, and how many
 models there are."""
@@ -209,26 +207,18 @@ class Stages:
         """
         if self.replicates < 2:
             return {}
-        shortlist = shortlist_models(self.work.entries, held_out)
+        entries = self.work.entries
+        shortlist = shortlist_models(entries, held_out)
         found: dict[int, Evidence] = {}
         for number, index in enumerate(shortlist.models):
-            numbers = [
-                self.work.entries[k].numbers for k, one in found.items() if one.discrepancy.usual
-            ]
-            if number >= shortlist.tied and min(numbers, default=math.inf) <= (
-                self.work.entries[index].numbers
-            ):
-                continue
-            planned = max(shortlist.tied, 1)
-            found[index] = self._matched(len(found), index, held_out[index].point, planned)
-        walks = [
-            index
-            for index, entry in enumerate(self.work.entries)
-            if entry.baseline and not held_out_differences(held_out[index], self.work.motion)
-        ]
+            numbers = [entries[k].numbers for k, one in found.items() if one.discrepancy.usual]
+            if number < shortlist.tied or entries[index].numbers < min(numbers, default=math.inf):
+                planned = max(shortlist.tied, 1)
+                found[index] = self._matched(len(found), index, held_out[index].point, planned)
         if any(one.discrepancy.usual for one in found.values()):
-            for index in walks:
-                found[index] = self._matched(len(found), index, np.empty(0), len(found) + 1)
+            for index, entry in enumerate(entries):
+                if entry.baseline and not held_out_differences(held_out[index], self.work.motion):
+                    found[index] = self._matched(len(found), index, np.empty(0), len(found) + 1)
         return found
 
     @cached_property
@@ -270,29 +260,22 @@ class Stages:
 
         A user's model may fail: that is said before the others take minutes.
         """
-        entries = self.work.entries
+        entries, costs = self.work.entries, self.work.costs()
+        missing = [unit.start for unit in retained.missing(units)]
         together = SearchProgress(
             [one.model.name for one in entries],
-            self.work.costs(),
-            lambda done, names: self.staged_progress.stage("models")(
-                done, sum(self.work.costs()), names
-            ),
+            costs,
+            [0 if index in missing else cost for index, cost in enumerate(costs)],
+            self.staged_progress.stage("models"),
         )
-        missing = [unit.start for unit in retained.missing(units)]
-        together.finished([unit.start for unit in units if unit.start not in missing])
-        threaded = (
-            [k for k in missing if runs_in_threads(entries[k])] if self.pool is not None else []
-        )
+        threaded = [k for k in missing if self.pool is not None and runs_in_threads(entries[k])]
         others = [k for k in missing if k not in threaded]
         alone = replace(self.work, within=together)
         share = max(len(threaded), 1)
-        shared = replace(
-            alone,
-            entries=[
-                one._replace(like=replace(one.like, threads=max(one.like.threads // share, 1)))
-                for one in entries
-            ],
-        )
+        sharing = [
+            one._replace(like=replace(one.like, threads=max(one.like.threads // share, 1)))
+            for one in entries
+        ]
         # The block takes more steps of time than the others, which take the longer the more they
         # have to search: so none is left over for one processor at the end.
         threaded.sort(
@@ -303,6 +286,7 @@ class Stages:
                 run_sweep(alone, [units[k] for k in others], store=retained, progress=look)
             if threaded:
                 first = [units[k] for k in threaded]
+                shared = replace(alone, entries=sharing)
                 run_sweep(shared, first, store=retained, executor=self.pool, progress=look)
         return collect(retained, units)
 
@@ -315,9 +299,8 @@ class Stages:
             self.staged_progress.stage("models")(done, total)
             look(done, total)
 
-        return run_sweep(
-            self.work, units, store=retained, executor=self.executor, progress=finished
-        )
+        executor = self.executor
+        return run_sweep(self.work, units, store=retained, executor=executor, progress=finished)
 
     def _matched(self, number: int, index: int, answer: np.ndarray, planned: int) -> Evidence:
         """Match the summaries with one model: units of 16 settings, the rest in this process.

@@ -88,15 +88,14 @@ class EvidenceRanking(NamedTuple):
 
         One with more of them has to be likelier than by chance.
         """
-        best = self.best
+        if self.best is None:
+            return []
+        numbers = entries[self.best].numbers
+        clearly_less = evidence[self.best].deviance - EVIDENCE.doubt
         return [
             k
             for k in self.alternatives
-            if best is not None
-            and (
-                evidence[k].deviance < evidence[best].deviance - EVIDENCE.doubt
-                or entries[k].numbers <= entries[best].numbers
-            )
+            if evidence[k].deviance < clearly_less or entries[k].numbers <= numbers
         ]
 
 
@@ -210,7 +209,7 @@ def estimate_evidence(
 ) -> Evidence:
     """Match the summaries of a recording with a model, and say how well that went."""
     parameters, replicates = len(entry.ranges), motion.replicates
-    objective = SummaryObjective(
+    objective = _Blurred(
         even_blocks(entry, motion),
         motion,
         store=store,
@@ -218,31 +217,26 @@ def estimate_evidence(
         tell=tell,
         most=most_settings(parameters, replicates),
     )
-    simulate = _Blurred(objective, motion.seed)
     setting, log_volume = np.empty(0), 0.0
     if parameters:
         optima = find_optima(
-            simulate,
+            objective,
             parameters,
             lambda: answer[None],
             order=label_order(entry),
             seed=motion.seed,
-            no_restart_above=EVIDENCE.give_up_above,
             give_up=EVIDENCE.give_up_above,
         )
         best = optima[0].solution
         setting, log_volume = rounded(np.clip(best.setting, 0.0, 1.0)), best.log_volume
     found = synthetic_likelihood_at(
-        lambda settings: simulate(settings)[:, 0], objective.recorded[0], setting, replicates
+        lambda settings: objective(settings)[:, 0], objective.recorded[0], setting, replicates
     )
-    evidence = Evidence(
-        discrepancy=Discrepancy.of(found.discrepancy, found.own_discrepancies),
-        # Laplace's approximation, with a prior that is even over the ranges.
-        deviance=found.discrepancy
-        + found.log_variance
-        - log_volume
-        - parameters * float(np.log(2.0 * np.pi)),
-    )
+    # Laplace's approximation, with a prior that is even over the ranges.
+    log_constant = parameters * float(np.log(2.0 * np.pi))
+    deviance = found.discrepancy + found.log_variance - log_volume - log_constant
+    discrepancy = Discrepancy.of(found.discrepancy, found.own_discrepancies)
+    evidence = Evidence(discrepancy, deviance)
     if entry.baseline or evidence.discrepancy.against:
         return evidence
     worlds = objective.worlds.simulated(setting[None], HELD_OUT_REPLICATES, stage="judged")
@@ -252,15 +246,11 @@ def estimate_evidence(
     )
 
 
-class _Blurred:
-    """Simulates and summarises as an objective does, and adds its own noise."""
-
-    def __init__(self, objective: SummaryObjective, seed: int) -> None:
-        self.recorded = objective.recorded
-        self._objective, self._seed = objective, seed
+class _Blurred(SummaryObjective):
+    """Adds noise to the summaries of simulated worlds."""
 
     def __call__(self, settings: Floats, *, parts: int = 1) -> Floats:
         """Return the summaries of settings, shape (settings, parts, summaries)."""
-        random = np.random.default_rng([self._seed, self._objective.done])
-        found = self._objective(settings, parts=parts)
+        random = np.random.default_rng([self.worlds.seed, self.done])
+        found = super().__call__(settings, parts=parts)
         return found + EVIDENCE.blur * random.standard_normal(found.shape)

@@ -127,12 +127,11 @@ def _summaries(models: int, evidence: Mapping[int, Evidence], best: int | None) 
         "asked": ("model", [k in evidence for k in range(models)]),
         "named": ("model", [k == best for k in range(models)]),
     }
-    said = {k: (*one.discrepancy, one.deviance) for k, one in evidence.items()}
+    numbers = np.full((4, models), np.nan)
+    for k, one in evidence.items():
+        numbers[:, k] = *one.discrepancy, one.deviance
     stored = ("discrepancy", "discrepancy_median", "discrepancy_q95", "deviance")
-    for place, name in enumerate(stored):
-        values = [said[k][place] if k in said else np.nan for k in range(models)]
-        data[name] = ("model", values)
-    return data
+    return data | {name: ("model", row) for name, row in zip(stored, numbers, strict=True)}
 
 
 def _padded(rows: Sequence[Floats]) -> Floats:
@@ -215,13 +214,8 @@ def model_verdicts(
     found = []
     for k, (entry, one) in enumerate(zip(entries, held_out, strict=True)):
         asked = evidence.get(k)
-        against, unable = law_findings(
-            entry,
-            one,
-            motion,
-            discrepancy=None if asked is None else asked.discrepancy,
-            bouts=() if asked is None else asked.bouts,
-        )
+        discrepancy, bouts = (None, ()) if asked is None else (asked.discrepancy, asked.bouts)
+        against, unable = law_findings(entry, one, motion, discrepancy=discrepancy, bouts=bouts)
         # Those that the summaries speak for stand beside the first.
         named = k in (answer.best, *answer.alternatives)
         if asked is not None and not (named or asked.discrepancy.against or answer.best is None):

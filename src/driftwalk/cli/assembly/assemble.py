@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source, with_binding, with_glued
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option
+from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import InputError
@@ -21,25 +20,17 @@ def assemble(
     given: StudyOptions,
     run: Run = None,
     flow: FlowFile = None,
-    earlier: Annotated[
-        Path | None,
-        option(
-            "--from RUN",
-            "Fit of glued blocks, or of free blocks in one recording: drag of hidden faces, shared "
-            "stirring.",
-            show_default=False,
-        ),
-    ] = None,
-    binding: Annotated[
-        Path | None,
-        option(
-            "--binding FILE",
-            "Kinds of blocks, types of their faces, and which of them latch, as a TOML table.",
-            panel=PANEL,
-            show_default=False,
-        ),
-    ] = None,
-    film: Annotated[str, option("--film gif|mp4|none", "Film of the first run.")] = "gif",
+    earlier: Path | None = optional(
+        "--from RUN",
+        "Fit of glued blocks, or of free blocks in one recording: drag of hidden faces, shared "
+        "stirring.",
+    ),
+    binding: Path | None = optional(
+        "--binding FILE",
+        "Kinds of blocks, types of their faces, and which of them latch, as a TOML table.",
+        panel=PANEL,
+    ),
+    film: str = optional("--film gif|mp4|none", "Film of the first run.", default="gif"),
     *,
     options: RunOptions,
 ) -> None:

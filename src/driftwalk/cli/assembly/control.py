@@ -12,7 +12,7 @@ from driftwalk.cli.inputs.model_source import Source, assembly_source
 from driftwalk.cli.inputs.varied import listed, read_varied
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.run import RunOptions
-from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
+from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_result
@@ -59,28 +59,24 @@ def plan(
         ),
     ] = None,
     flow: FlowFile = None,
-    every: Annotated[float, option("--every", "Time between two decisions.", unit="s")] = 5.0,
-    vary: Annotated[
-        list[str] | None,
-        option(
-            "--vary NAME=VALUES",
-            "Modes: flow-scale=0,0.5,1 or force-std=0.2mN,1.2mN, over every flow. Repeatable.",
-        ),
-    ] = None,
-    latency: Annotated[
-        float,
-        option("--latency", "Time from an observation until the pumps have changed.", unit="s"),
-    ] = 0.0,
-    missed: Annotated[
-        float, option("--missed SHARE", "Share of the observations that give no class.")
-    ] = 0.0,
-    dwell: Annotated[
-        float, option("--dwell", "Shortest time for which a mode is held.", unit="s")
-    ] = 0.0,
-    rounds: Annotated[int, option("--rounds N", "Rounds of planning.", panel=PANEL, min=1)] = 12,
-    worlds: Annotated[
-        int, option("--worlds N", "Simulated worlds of a round.", panel=PANEL, min=20)
-    ] = 1000,
+    every: float = optional("--every", "Time between two decisions.", unit="s", default=5.0),
+    vary: list[str] | None = optional(
+        "--vary NAME=VALUES",
+        "Modes: flow-scale=0,0.5,1 or force-std=0.2mN,1.2mN, over every flow. Repeatable.",
+    ),
+    latency: float = optional(
+        "--latency", "Time from an observation until the pumps have changed.", unit="s", default=0.0
+    ),
+    missed: float = optional(
+        "--missed SHARE", "Share of the observations that give no class.", default=0.0
+    ),
+    dwell: float = optional(
+        "--dwell", "Shortest time for which a mode is held.", unit="s", default=0.0
+    ),
+    rounds: int = optional("--rounds N", "Rounds of planning.", panel=PANEL, min=1, default=12),
+    worlds: int = optional(
+        "--worlds N", "Simulated worlds of a round.", panel=PANEL, min=20, default=1000
+    ),
     *,
     options: RunOptions,
 ) -> None:
@@ -121,17 +117,16 @@ def plan(
 @with_options(RunOptions, "out", "cluster", "cluster_options", "overwrite", "json")
 def try_policy(
     policy: Policy,
-    worlds: Annotated[int, option("--worlds N", "Fresh worlds of each arm.", min=20)] = 2000,
-    latency: Annotated[
-        float | None,
-        option("--latency", "Latency of the worlds (default: the plan's).", unit="s"),
-    ] = None,
-    missed: Annotated[
-        float | None, option("--missed SHARE", "Looks without a class (default: the plan's).")
-    ] = None,
-    force_factor: Annotated[
-        float, option("--force-factor NUMBER", "Factor on the worlds' sigma_F: a wrong model.")
-    ] = 1.0,
+    worlds: int = optional("--worlds N", "Fresh worlds of each arm.", min=20, default=2000),
+    latency: float | None = optional(
+        "--latency", "Latency of the worlds (default: the plan's).", unit="s"
+    ),
+    missed: float | None = optional(
+        "--missed SHARE", "Looks without a class (default: the plan's)."
+    ),
+    force_factor: float = optional(
+        "--force-factor NUMBER", "Factor on the worlds' sigma_F: a wrong model.", default=1.0
+    ),
     *,
     options: RunOptions,
 ) -> None:
@@ -161,9 +156,9 @@ def run(
     live: Annotated[
         str, option("--live HOST:PORT", "Where driftwalk track or play publishes (--live PORT).")
     ],
-    patience: Annotated[
-        float, option("--patience", "Time without a frame before the safe mode.", unit="s")
-    ] = 2.0,
+    patience: float = optional(
+        "--patience", "Time without a frame before the safe mode.", unit="s", default=2.0
+    ),
 ) -> None:
     """Follow a policy over a tracker's stream: one line of JSON for each decision, on stdout.
 

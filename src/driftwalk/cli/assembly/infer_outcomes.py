@@ -9,7 +9,7 @@ from driftwalk.cli.assembly.kinetics import files_of, opened_histories
 from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source
 from driftwalk.cli.inputs.varied import parted_numbers, read_varied
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
+from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS, INFERRED_KEYS, INFERRED_RANGES
@@ -37,29 +37,23 @@ def infer_outcomes(
         ),
     ],
     flow: FlowFile = None,
-    vary: Annotated[
-        list[str] | None,
-        option(
-            "--vary NAME=FROM:TO",
-            "Parameter to infer and its range: drag-coefficient=0.3:0.6. Two to four of them.",
-            panel=PANEL,
-        ),
-    ] = None,
-    after: Annotated[
-        float | None,
-        option(
-            "--after",
-            "When the final classes were read; default: the end of the runs, or 5 min.",
-            unit="s",
-        ),
-    ] = None,
-    runs: Annotated[
-        int, option("--runs N", "Simulated runs of each node of the emulator.", min=20)
-    ] = 300,
-    truths: Annotated[
-        int, option("--truths N", "Simulated data sets of the self-check.", min=20)
-    ] = 200,
-    seed: Annotated[int, option("--seed N", "Seed of the simulations.", min=0)] = 1,
+    vary: list[str] | None = optional(
+        "--vary NAME=FROM:TO",
+        "Parameter to infer and its range: drag-coefficient=0.3:0.6. Two to four of them.",
+        panel=PANEL,
+    ),
+    after: float | None = optional(
+        "--after",
+        "When the final classes were read; default: the end of the runs, or 5 min.",
+        unit="s",
+    ),
+    runs: int = optional(
+        "--runs N", "Simulated runs of each node of the emulator.", min=20, default=300
+    ),
+    truths: int = optional(
+        "--truths N", "Simulated data sets of the self-check.", min=20, default=200
+    ),
+    seed: int = optional("--seed N", "Seed of the simulations.", min=0, default=1),
     *,
     options: RunOptions,
 ) -> None:

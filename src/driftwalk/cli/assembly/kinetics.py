@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.run import RunOptions
-from driftwalk.cli.options.shared_types import PANEL, argument, option
+from driftwalk.cli.options.shared_types import PANEL, argument, optional
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,17 +24,13 @@ def kinetics(
             "second one is compared.",
         ),
     ],
-    target: Annotated[
-        str | None, option("--target CLASS", "Outcome class to be reached, such as T.")
-    ] = None,
-    blocks: Annotated[
-        int | None,
-        option("--blocks N", "Extrapolate the rate of the first join to another number.", min=2),
-    ] = None,
-    seed: Annotated[
-        int,
-        option("--seed N", "Seed of the bootstrap and of the permutations.", panel=PANEL, min=0),
-    ] = 1,
+    target: str | None = optional("--target CLASS", "Outcome class to be reached, such as T."),
+    blocks: int | None = optional(
+        "--blocks N", "Extrapolate the rate of the first join to another number.", min=2
+    ),
+    seed: int = optional(
+        "--seed N", "Seed of the bootstrap and of the permutations.", panel=PANEL, min=0, default=1
+    ),
     *,
     options: RunOptions,
 ) -> None:

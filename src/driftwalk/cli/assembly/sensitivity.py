@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from driftwalk.cli.inputs.model_source import RUN_NAMES, Source, assembly_source
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.inputs.varied import listed, read_varied
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option
+from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import InputError
@@ -25,16 +25,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.runs import SensitivityResult
     from driftwalk.schema.answers.parts import Answer
-
-
-Vary = Annotated[
-    list[str] | None,
-    option(
-        "--vary NAME=VALUES",
-        "Values to compare: blocks=2,3,4 or drag-coefficient=0:1.5:0.05. Repeatable.",
-        panel=PANEL,
-    ),
-]
 
 
 AXES: Final = {
@@ -63,10 +53,14 @@ def sensitivity(
     given: StudyOptions,
     run: Run = None,
     flow: FlowFile = None,
-    vary: Vary = None,
-    sobol: Annotated[
-        int | None, option("--sobol N", "Base samples for Sobol' indices, a power of two.", min=8)
-    ] = None,
+    vary: list[str] | None = optional(
+        "--vary NAME=VALUES",
+        "Values to compare: blocks=2,3,4 or drag-coefficient=0:1.5:0.05. Repeatable.",
+        panel=PANEL,
+    ),
+    sobol: int | None = optional(
+        "--sobol N", "Base samples for Sobol' indices, a power of two.", min=8
+    ),
     *,
     options: RunOptions,
 ) -> None:

@@ -12,7 +12,7 @@ from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source, load_f
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.inputs.varied import parted_numbers, read_varied
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option
+from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import ConfigurationError
@@ -39,34 +39,27 @@ def maximise_yield(
     target: Annotated[str, option("--target CLASS", "Outcome class to be reached, such as T.")],
     run: Run = None,
     flow: FlowFile = None,
-    by: Annotated[
-        str | None,
-        option("--by TIME", "When it is to be reached; default: at the end of the runs."),
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        option(
-            "--vary NAME=VALUES",
-            "Settings to compare: blocks=4,5, or a range to search: flow-scale=0.5:1.5. "
-            "Repeatable.",
-            panel=PANEL,
-        ),
-    ] = None,
-    runs: Annotated[
-        int,
-        option(
-            "--runs N",
-            "Runs that choose by halving. At most five times as many are simulated to distinguish "
-            "the best (six with a range to search).",
-            min=1,
-        ),
-    ] = 6000,
-    fresh_runs: Annotated[
-        int, option("--fresh-runs N", "Runs that report the yield of a setting.", min=1)
-    ] = 2000,
-    within: Annotated[
-        float, option("--within SHARE", "Difference of yields that does not matter.")
-    ] = 0.02,
+    by: str | None = optional(
+        "--by TIME", "When it is to be reached; default: at the end of the runs."
+    ),
+    vary: list[str] | None = optional(
+        "--vary NAME=VALUES",
+        "Settings to compare: blocks=4,5, or a range to search: flow-scale=0.5:1.5. Repeatable.",
+        panel=PANEL,
+    ),
+    runs: int = optional(
+        "--runs N",
+        "Runs that choose by halving. At most five times as many are simulated to distinguish "
+        "the best (six with a range to search).",
+        min=1,
+        default=6000,
+    ),
+    fresh_runs: int = optional(
+        "--fresh-runs N", "Runs that report the yield of a setting.", min=1, default=2000
+    ),
+    within: float = optional(
+        "--within SHARE", "Difference of yields that does not matter.", default=0.02
+    ),
     *,
     options: RunOptions,
 ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.cli.options.recording import RecordingOptions, parse_pairs, tank_text
+from driftwalk.cli.options.recording import RecordingOptions, parse_columns, tank_text
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def read_flow_file(
     """
     from driftwalk.flow import flow_format, load_flow
 
-    columns = parse_pairs(how.columns or [], "--columns")
+    columns = parse_columns(how.columns or [])
     velocities = bool({"u", "v"} & set(columns))
     recording = how.format, how.x, how.sheet, None if velocities else how.columns
     said = any(one is not None for one in recording)
@@ -58,13 +58,12 @@ def read_flow_file(
         "frame_interval": frame_interval,
         "length_unit": how.length_unit,
         "y_axis": how.y_axis,
-        "variables": None if variables is None else parse_pairs([variables], "--flow-variables"),
+        "variables": None if variables is None else parse_columns([variables], "--flow-variables"),
         "columns": columns,
         "header_line": how.header_line,
         "delimiter": how.delimiter,
     }
-    tank = None if how.tank is None else tank_text(how.tank)
-    return load_flow(path, **values, **({} if tank is None else _placed(tank)))
+    return load_flow(path, **values, **({} if how.tank is None else _placed(tank_text(how.tank))))
 
 
 def _placed(tank: str) -> dict[str, Any]:
@@ -72,11 +71,10 @@ def _placed(tank: str) -> dict[str, Any]:
     from driftwalk.record import place_arena
 
     kind, _, rest = tank.partition(":")
-    stated = "@" in rest or kind == "polygon"
-    if not stated and kind != "fit":
-        tank = f"{tank}@0,0"
-    elif kind == "fit":
+    if kind == "fit":
         raise InputError("--tank fit is for recordings: state the tank, as in 40cm@X,Y")
+    if "@" not in rest and kind != "polygon":
+        tank = f"{tank}@0,0"
     # Its centre is stated, so that no positions have to say where it is.
     nowhere = np.empty(0)
     placed = place_arena(tank, nowhere, nowhere)
@@ -94,17 +92,16 @@ def describe_field(field: xr.Dataset) -> dict[str, Any]:
     speed = np.hypot(field["u"].values, field["v"].values)
     measured = field["flag"].values == 1
     known = speed[measured] if measured.any() else speed
+    attrs = field.attrs
     facts: dict[str, float] = {
-        key: int(field.attrs[key]) for key in ("samples_used", "tracks_used") if key in field.attrs
+        key: int(attrs[key]) for key in ("samples_used", "tracks_used") if key in attrs
     }
     if "u_standard_error" in field:
         error = np.hypot(field["u_standard_error"].values, field["v_standard_error"].values)
         if np.isfinite(error).any():
             facts["standard_error_median_m_s"] = float(np.nanmedian(error))
     return {
-        "source": field.attrs.get("source"),
-        "reading": field.attrs.get("reading"),
-        "method": field.attrs.get("method"),
+        **{key: attrs.get(key) for key in ("source", "reading", "method")},
         "columns": field.sizes["x"],
         "rows": field.sizes["y"],
         "frames": field.sizes.get("time", 1),
@@ -117,5 +114,5 @@ def describe_field(field: xr.Dataset) -> dict[str, Any]:
         "speed_mean_m_s": float(known.mean()),
         "speed_max_m_s": float(known.max()),
         **facts,
-        "warnings": [text for text in (field.attrs.get("warning"),) if text],
+        "warnings": [attrs["warning"]] if attrs.get("warning") else [],
     }

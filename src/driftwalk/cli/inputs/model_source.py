@@ -106,10 +106,15 @@ def _with_table(given: StudyOptions) -> StudyOptions:
     return given.and_also({TABLE: str(given.file.parent / name)}, keys=given.keys)
 
 
+def given_files(**roles: Path | None) -> dict[str, Path]:
+    """Return the files that were given, by their roles."""
+    return {role: path for role, path in roles.items() if path is not None}
+
+
 def _table_of(study: Study) -> dict[str, Path]:
     """Return the file of the table of attraction by its role, none where there is no table."""
     name = study.interaction.attraction
-    return {} if name is None else {"attraction": Path(name)}
+    return given_files(attraction=None if name is None else Path(name))
 
 
 def _source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
@@ -122,12 +127,11 @@ def _source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
             "or a flow field (--flow)"
         )
     chosen = given.study()
-    inputs = {"flow": flow_file, **({} if given.file is None else {"study": given.file})}
-    warning = unstated_warning(chosen, about="simulation")
-    field = load_flow_for(flow_file, chosen)
-    said = [*([] if warning is None else [warning]), *_without_effect(given, chosen)]
-    field, stretched = _in_tank(field, given, chosen)
-    return Source(chosen, field, None, inputs | _table_of(chosen), [*said, *stretched])
+    unstated = unstated_warning(chosen, about="simulation")
+    field, stretched = _in_tank(load_flow_for(flow_file, chosen), given, chosen)
+    said = [*filter(None, [unstated]), *_without_effect(given, chosen), *stretched]
+    inputs = given_files(flow=flow_file, study=given.file) | _table_of(chosen)
+    return Source(chosen, field, None, inputs, said)
 
 
 def _in_tank(field: xr.Dataset, given: StudyOptions, study: Study) -> tuple[xr.Dataset, list[str]]:
@@ -213,7 +217,7 @@ def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) 
         field, inputs["flow"] = load_flow_for(flow_file, chosen), flow_file
     field, stretched = _in_tank(field, given, chosen)
     warnings = [*found.warnings, *_without_effect(given, chosen), *stretched]
-    inputs = inputs | _table_of(chosen)
+    inputs |= _table_of(chosen)
     drawn = (found.uncertainty, inputs, warnings, found.not_drawn, found.first_force)
     return Source(chosen, field, *drawn)
 
@@ -248,16 +252,13 @@ def with_glued(given: StudyOptions, folder: Path | None) -> tuple[StudyOptions, 
     except InputError as error:
         how = "driftwalk fit DIMER --body-shape xx --from FIT, driftwalk fit PAIR --interaction"
         raise InputError(f"{folder}: {error} ({how})") from None
-    named = [name for name, key in GLUED.items() if key in quantiles]
-    values = {GLUED[name]: fitted_value(found, name) for name in named}
-    said = [
-        f"{PARAMETERS[name].words} {value:.2g} ({low:.2g} to {high:.2g})"
-        + (" m" if name == "stirring_length" else "")
-        for name in named
-        for value, (low, high) in [
-            (fitted_value(found, name), found["interval"].sel(parameter=name).values)
-        ]
-    ]
+    values, said = {}, []
+    for name, key in GLUED.items():
+        if key in quantiles:
+            value = values[key] = fitted_value(found, name)
+            low, high = found["interval"].sel(parameter=name).values
+            unit = " m" if name == "stirring_length" else ""
+            said.append(f"{PARAMETERS[name].words} {value:.2g} ({low:.2g} to {high:.2g}){unit}")
     print_note(f"{'; '.join(said)}: from {folder}")
     kept = {key: value for key, value in values.items() if key not in given.overrides}
     drawn = {key: values for key, values in quantiles.items() if key in kept}
@@ -277,10 +278,6 @@ def with_binding(given: StudyOptions, path: Path | None) -> StudyOptions:
     from driftwalk.model import read_binding
 
     found = read_binding(path)
-    rules = {
-        "assembly.blocks": found.blocks,
-        "assembly.binding": found.model_dump(exclude_unset=True),
-    }
     wanted = given.overrides.get("assembly.blocks", found.blocks)
     if "assembly.faces" in given.overrides:
         raise InputError(f"--faces and --binding {path} both say which faces latch: give one")
@@ -289,7 +286,10 @@ def with_binding(given: StudyOptions, path: Path | None) -> StudyOptions:
             f"{path}: the kinds count {found.blocks} blocks, and --blocks says {wanted}; make them "
             "the same"
         )
-    return given.and_also(rules, keys=given.keys)
+    rules = found.model_dump(exclude_unset=True)
+    return given.and_also(
+        {"assembly.blocks": found.blocks, "assembly.binding": rules}, keys=given.keys
+    )
 
 
 def load_flow_for(path: Path, study: Study) -> xr.Dataset:
@@ -365,14 +365,12 @@ class ModelSource:
 
     def study(self) -> Study:
         """Return the study of the run, where it has one, with the options over it."""
-        if self.found is None:
-            return self.given.study()
-        if self.found_block:
+        if self.found is not None and self.found_block:
             own = self.found.block_study()
-        elif self.given.file is not None or not self.found.has_study:
-            return self.given.study()
-        else:
+        elif self.found is not None and self.given.file is None and self.found.has_study:
             own = self.found.study()
+        else:
+            return self.given.study()
         return self.given.over(own, base=f"the study of {self.folder}")
 
     def flow_for(self, model: MotionModel, study: Study, flow: Path | None) -> xr.Dataset | None:

@@ -53,8 +53,9 @@ def what_else(path: Path) -> str | None:
     >>> from importlib.resources import files
     >>> what_else(Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv")))
     """
-    # NumPy comes with it, which the help of the commands does without.
+    # NumPy comes with them, which the help of the commands does without.
     from driftwalk.core.files.run_layout import state_of
+    from driftwalk.schema.stores.netcdf import kind_of_file
 
     if path.is_dir() and state_of(path) in ("unfinished", "finished"):
         recording = path / "recording.nc"
@@ -66,8 +67,10 @@ def what_else(path: Path) -> str | None:
         return "is a video: driftwalk track makes a recording of it"
     if _is_field(path):
         return f"holds {KINDS['flow_field']}"
-    kind = _netcdf_kind(path)
-    return None if kind is None else f"holds {KINDS.get(kind, _OTHER.format(kind))}"
+    kind = kind_of_file(path) if path.suffix.lower() == ".nc" else None
+    if kind is None or kind in ("trajectory", "simulation"):
+        return None
+    return f"holds {KINDS.get(kind, _OTHER.format(kind))}"
 
 
 def _is_field(path: Path) -> bool:
@@ -94,13 +97,3 @@ def _maybe_a_field(path: Path) -> str | None:
         f"is NetCDF of no recording that is known, with {names}: if it is a flow field, name its "
         "variables with --flow-variables u=NAME,v=NAME,x=NAME,y=NAME"
     )
-
-
-def _netcdf_kind(path: Path) -> str | None:
-    """Return which kind of driftwalk's own datasets a file holds, None for any other file."""
-    from driftwalk.schema.stores.netcdf import kind_of_file
-
-    if path.suffix.lower() != ".nc":
-        return None
-    kind = kind_of_file(path)
-    return None if kind in ("trajectory", "simulation") else kind

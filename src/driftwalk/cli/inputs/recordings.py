@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.cli.inputs.model_source import load_flow_for
+from driftwalk.cli.inputs.model_source import given_files, load_flow_for
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.study import TANK, StudyOptions, option_name
@@ -100,7 +100,6 @@ def read_for_models(
     others = any(map(feels_others, models))
     read = read_for_run([path], given, how, bodies="all" if others else "named")
     recording, study = read.trajectories[0], read.study
-    inputs = {"recording": path, "flow": flow, "study": given.file}
     about: About = "block" if "block" in models else "tank"
     _, warnings = sound_track(recording, read.body)
     work = {
@@ -108,7 +107,7 @@ def read_for_models(
         "study": study,
         "flow": None if flow is None else load_flow_for(flow, study),
         "body": read.body if others else how.body,
-        "inputs": {role: path for role, path in inputs.items() if path is not None},
+        "inputs": given_files(recording=path, flow=flow, study=given.file),
     }
     return work, opening_note(study, given, how=how, about=about, warnings=warnings)
 

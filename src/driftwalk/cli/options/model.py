@@ -23,42 +23,11 @@ ModelName = Annotated[
         "the block in stirred water.",
     ),
 ]
-ParameterChoices = Annotated[
-    list[str] | None,
-    option(
-        "--parameter NAME=VALUE|LOW,HIGH",
-        "Known value, or range of the search, of a parameter of --model; repeat for others.",
-    ),
-]
-ComparedParameters = Annotated[
-    list[str] | None,
-    option(
-        "--parameter NAME=VALUE|LOW,HIGH",
-        "Known value, or range of the search, of a parameter of each of the --models that has "
-        "it; repeat for others.",
-    ),
-]
-
 ParameterValues = Annotated[
     list[str] | None,
     option(
         "--parameter NAME=VALUE",
         "Value of a parameter of --model, in its SI unit; repeat for others.",
-    ),
-]
-PlayedParameters = Annotated[
-    list[str] | None,
-    option(
-        "--parameter NAME=VALUE|LOW,HIGH",
-        "Value to begin with, or range of the slider, of a parameter of --model; repeat for "
-        "others.",
-    ),
-]
-KnownParameters = Annotated[
-    list[str] | None,
-    option(
-        "--known NAME",
-        "Parameter of --model, or position_noise, that the calibrations know; repeat for others.",
     ),
 ]
 

@@ -103,11 +103,17 @@ class RecordingOptions:
         "--replicate N", "Replicate of a simulation, counted from 0 (default: the first).", min=0
     )
 
+    @property
+    def _given(self) -> dict[str, Any]:
+        """The options that are given, by their fields."""
+        # The start may be 0 s; an option that is not given is None, or False for a flag.
+        return {
+            name: one for name, one in vars(self).items() if one is not None and one is not False
+        }
+
     def arguments(self) -> dict[str, Any]:
         """Return the arguments of `driftwalk.load` that are given."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        # The start may be 0 s; an option that is not given is None, or False for a flag.
-        given = {name: one for name, one in values.items() if one is not None and one is not False}
+        given = self._given
         if self.sort:
             given["sort"] = "sort"
         if self.columns:
@@ -121,24 +127,19 @@ class RecordingOptions:
     def words(self) -> list[str]:
         """Return the options that are given, as a user types them."""
         words: list[str] = []
-        for field in fields(self):
-            value, option = getattr(self, field.name), field.metadata[OPTION]
-            # In an annotation, the name of an option is where a default would be elsewhere.
-            name = str(option.default)
+        for field, value in self._given.items():
+            name = _NAMES[field]
+            if value is True:
+                words.append(name)
+                continue
             for one in value if isinstance(value, list) else [value]:
-                if one is True:
-                    words.append(name)
-                elif one is not None and one is not False:
-                    text = f"{one:.12g}" if isinstance(one, float) else str(one)
-                    words += [name, text]
+                words += [name, f"{one:.12g}" if isinstance(one, float) else str(one)]
         return words
 
     def refuse_given(self, what: str) -> None:
         """Refuse options that have no meaning for a run directory or a simulation."""
-        given = [one.name for one in fields(self) if getattr(self, one.name) not in (None, False)]
-        words = {"start": "from", "stop": "to"}
-        if given:
-            names = ", ".join(f"--{words.get(name, name).replace('_', '-')}" for name in given)
+        if self._given:
+            names = ", ".join(_NAMES[field] for field in self._given)
             raise InputError(f"{names}: for a recording; {what}")
 
     def load(self, path: Path, *, side: float | None = None) -> xr.Dataset:
@@ -161,6 +162,11 @@ class RecordingOptions:
         return recording
 
 
+# In an annotation, the name of an option is where a default would be elsewhere.
+_NAMES = {one.name: str(one.metadata[OPTION].default) for one in fields(RecordingOptions)}
+"""The options by their fields."""
+
+
 def tank_text(text: str) -> str:
     """Return a tank as `driftwalk.load` takes it; a bare size is that of a circle or a rectangle.
 
@@ -174,23 +180,14 @@ def tank_text(text: str) -> str:
     return f"rect:{text}" if "x" in text.partition("@")[0] else f"circle:{text}"
 
 
-def parse_columns(texts: list[str]) -> dict[str, str]:
-    """Read ``t=Time:ms,x=3`` into a mapping.
+def parse_columns(texts: list[str], option: str = "--columns") -> dict[str, str]:
+    """Read ``QUANTITY=NAME`` with commas between, as the value of an option.
 
     Examples
     --------
     >>> parse_columns(["t=Time:ms,x=3", "y=4"])
     {'t': 'Time:ms', 'x': '3', 'y': '4'}
-    """
-    return parse_pairs(texts, "--columns")
-
-
-def parse_pairs(texts: list[str], option: str) -> dict[str, str]:
-    """Read ``QUANTITY=NAME`` with commas between, as the value of an option.
-
-    Examples
-    --------
-    >>> parse_pairs(["u=water_u,v=water_v"], "--flow-variables")
+    >>> parse_columns(["u=water_u,v=water_v"], "--flow-variables")
     {'u': 'water_u', 'v': 'water_v'}
     """
     pairs: dict[str, str] = {}

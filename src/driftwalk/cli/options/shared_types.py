@@ -47,14 +47,7 @@ def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
     return parse
 
 
-def option(
-    names: str,
-    help: str,
-    *,
-    panel: str | None = None,
-    unit: str = "",
-    **more: Any,
-) -> Any:
+def option(names: str, help: str, *, panel: str | None = None, unit: str = "", **more: Any) -> Any:
     """Return the declaration of an option; with a unit, of one that takes a quantity.
 
     The names stand with the placeholder of the value as in the help: ``"--out -o FILE"``.
@@ -70,6 +63,20 @@ def option(
         rich_help_panel=panel,
         **more,
     )
+
+
+def optional(names: str, help: str, *, default: Any = None, **more: Any) -> Any:
+    """Return the declaration of an option that may be left out, as the default of a parameter."""
+    declared = option(names, help, **more)
+    # In an annotation, the name of an option is where the default is here.
+    declared.param_decls = (declared.default, *declared.param_decls)
+    declared.default = default
+    return declared
+
+
+def flag(name: str, help: str) -> Any:
+    """Return the declaration of an option without a value, as the default of a parameter."""
+    return optional(name, help, default=False)
 
 
 def argument(placeholder: str, help: str) -> Any:
@@ -119,7 +126,6 @@ FlowFile = Annotated[
         "--flow FILE",
         "Flow field to use, or the run directory that holds it.",
         callback=flow_of_run,
-        show_default=False,
     ),
 ]
 FrameInterval = Annotated[
@@ -137,7 +143,6 @@ FlowVariables = Annotated[
         "--flow-variables u=NAME,v=NAME",
         "Variables of a flow field in NetCDF: u, v, x, y, time, mask.",
         panel=READING,
-        show_default=False,
     ),
 ]
 Json = Annotated[bool, option("--json", "Print the result as JSON on stdout.")]

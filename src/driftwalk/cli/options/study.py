@@ -12,8 +12,9 @@ An option that is not given leaves the study file's value as it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -115,6 +116,18 @@ class StudyOptions:
             given = [option_name(key, keys=self.keys) for key in self.overrides]
             raise ConfigurationError(f"{', '.join(given)} over {base}: {error}") from error
 
+    def refuse(self, keys: Iterable[str], why: str) -> None:
+        """Refuse options that set one of these keys of the study.
+
+        Raises
+        ------
+        ConfigurationError
+            Names the options.
+        """
+        names = [option_name(key, keys=self.keys) for key in keys if key in self.overrides]
+        if names:
+            raise ConfigurationError(f"{', '.join(names)}: {why}")
+
     def and_also(self, overrides: Mapping[str, Any], *, keys: Mapping[str, str]) -> StudyOptions:
         """Return these options and more of them, with the names of the further ones."""
         both = {**self.overrides, **overrides}
@@ -135,18 +148,15 @@ def with_study_options(
     file : {"--study", "none"}
         Whether the command takes a study file by that option.
     """
-    parts = {name: _part(name, keys) for name in names}
+    parts = {"study": Part(StudyFile, None)} if file == "--study" else {}
+    parts |= {name: _part(name, keys) for name in names}
 
     def make(values: dict[str, Any]) -> StudyOptions:
         path = values.pop("study", None)
         given = {name: _items(value) for name, value in values.items()}
         return StudyOptions(path, study_overrides(keys=keys, **given), keys)
 
-    def decorate(function: Command) -> Command:
-        before = {"study": Part(StudyFile, None)} if file == "--study" else {}
-        return spread(function, StudyOptions, {**before, **parts}, make)
-
-    return decorate
+    return partial(spread, kind=StudyOptions, parts=parts, make=make)
 
 
 def study_option(name: str, keys: Mapping[str, str] = STUDY_KEYS) -> Any:
@@ -171,7 +181,6 @@ def study_option(name: str, keys: Mapping[str, str] = STUDY_KEYS) -> Any:
         min=quantity.ge if quantity is not None and is_whole else None,
         parser=None if quantity is None or plain else quantity_parser(quantity.unit, *key.words),
         rich_help_panel=PANELS.get(keys[name].partition(".")[0], PANEL),
-        show_default=False,
     )
 
 

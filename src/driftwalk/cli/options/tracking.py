@@ -5,20 +5,15 @@ from __future__ import annotations
 from dataclasses import MISSING, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 from driftwalk.cli.options.flatten_options import option_field
 from driftwalk.cli.options.shared_types import SCALE, argument, parse_scale
 from driftwalk.core.errors import InputError
 
-_FINDING: Final = "How objects are found"
-_MOTION: Final = "How they move"
-_LIVE: Final = "Live output"
-
-
-_found = partial(option_field, panel=_FINDING)
-_moving = partial(option_field, panel=_MOTION)
-_sent = partial(option_field, panel=_LIVE)
+_found = partial(option_field, panel="How objects are found")
+_moving = partial(option_field, panel="How they move")
+_sent = partial(option_field, panel="Live output")
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options.shared_types import PANEL, Json, Replace, argument, option
+from driftwalk.cli.options.shared_types import (
+    PANEL,
+    Json,
+    Replace,
+    argument,
+    flag,
+    option,
+    optional,
+)
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
 from driftwalk.core.errors import FormatError, InputError
@@ -23,6 +30,7 @@ _POOR_PX: Final = 1.0
 camera_app = typer.Typer(add_completion=False, cls=HelpGroup)
 
 
+@camera_app.command(cls=HelpCommand)
 def calibrate(
     images: Annotated[
         list[Path],
@@ -34,19 +42,16 @@ def calibrate(
     out: Annotated[Path, option("--out -o FILE.toml", "File to write.")],
     squares: Annotated[str, option("--squares COLUMNSxROWS", "Squares of the board, such as 9x7.")],
     square: Annotated[float, option("--square", "Side of a square.", unit="m", panel=PANEL)],
-    board: Annotated[
-        Literal["chessboard", "charuco"], option("--board", "Kind of the board.")
-    ] = "chessboard",
-    tag: Annotated[
-        float | None, option("--tag", "Side of a ChArUco board's tags.", unit="m", panel=PANEL)
-    ] = None,
-    dictionary: Annotated[
-        str, option("--dictionary DICT", "Dictionary of these tags.")
-    ] = "DICT_4X4_50",
-    no_lens: Annotated[
-        bool,
-        option("--no-lens", "Find only the plane; one image is enough, and lines stay straight."),
-    ] = False,
+    board: Literal["chessboard", "charuco"] = optional(
+        "--board", "Kind of the board.", default="chessboard"
+    ),
+    tag: float | None = optional("--tag", "Side of a ChArUco board's tags.", unit="m", panel=PANEL),
+    dictionary: str = optional(
+        "--dictionary DICT", "Dictionary of these tags.", default="DICT_4X4_50"
+    ),
+    no_lens: bool = flag(
+        "--no-lens", "Find only the plane; one image is enough, and lines stay straight."
+    ),
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:
@@ -108,11 +113,6 @@ def _read(path: Path) -> Any:
     if not path.is_file():
         raise FormatError("no such image", path=path)
     return read_image(path)
-
-
-camera_app.command("calibrate", cls=HelpCommand, help=paragraphs(calibrate.__doc__ or ""))(
-    calibrate
-)
 
 
 @camera_app.callback()

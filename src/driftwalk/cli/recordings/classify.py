@@ -11,7 +11,7 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.inputs.recordings import open_kind
 from driftwalk.cli.options.flatten_options import option_field, with_options
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared_types import Json, Replace, argument, option
+from driftwalk.cli.options.shared_types import Json, Replace, argument, optional
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -75,10 +75,10 @@ def classify(
     given: StudyOptions,
     how: RecordingOptions,
     criteria: JoinCriteria,
-    chirality: Annotated[
-        Literal["merged", "distinct"], option("--chirality", "Mirror images as one shape or two.")
-    ] = "merged",
-    out: Annotated[Path | None, option("--out -o FILE.nc", "File for the result.")] = None,
+    chirality: Literal["merged", "distinct"] = optional(
+        "--chirality", "Mirror images as one shape or two.", default="merged"
+    ),
+    out: Path | None = optional("--out -o FILE.nc", "File for the result."),
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:
@@ -124,12 +124,11 @@ def summarise(found: xr.Dataset) -> dict[str, Any]:
         for key, value in found.attrs.items()
         if key not in ("kind", "schema_version", "source", "arena")
     }
-    classes = _changes(found, names)
     final = _name(names, found["outcome"].values[-1])
     return {
         **facts,
         "bodies": found["body"].values,
-        "classes": classes,
+        "classes": _changes(found, names),
         "proportions": {
             name: share
             for name, share in zip(names, found["proportion"].values.tolist(), strict=True)
@@ -228,8 +227,8 @@ def _rate_table(summary: dict[str, Any]) -> None:
             low, high = one["interval_per_s"]
             cells += [one["count"], f"{one['per_s']:.3g}", f"{low:.3g} to {high:.3g}"]
         rows.append(cells)
-    heads = (["joinings", "(1/s)", interval], ["partings", "(1/s)", interval])
-    print_table(rows, columns=["class", *heads[0], *heads[1]])
+    heads = ["class", "joinings", "(1/s)", interval, "partings", "(1/s)", interval]
+    print_table(rows, columns=heads)
     print()
     if (rate := summary.get("bond_rate_per_s")) is not None:
         low, high = summary["bond_rate_low_per_s"], summary["bond_rate_high_per_s"]

@@ -107,12 +107,7 @@ def info(
     from driftwalk.cli.inputs.recordings import words_to_fit
     from driftwalk.record import describe
 
-    field = read_flow_file(
-        recording,
-        how,
-        frame_interval=frame_interval,
-        variables=flow_variables,
-    )
+    field = read_flow_file(recording, how, frame_interval=frame_interval, variables=flow_variables)
     if field is not None:
         _print_field(describe_field(field), json=json)
         return
@@ -201,17 +196,16 @@ def _arena_text(described: dict[str, Any]) -> str:
     arena = described["arena"]
     if arena is None:
         return "not stated (--tank)"
-    sizes = {
-        "circle": lambda: f"circle, diameter {arena['diameter_m'] * 100:.4g} cm",
-        "rectangle": lambda: (
-            f"rectangle, {arena['width_m'] * 100:.4g} x {arena['height_m'] * 100:.4g} cm"
-        ),
-        "polygon": lambda: f"polygon with {len(arena['vertices_m'])} vertices",
-    }
+    if arena["shape"] == "circle":
+        size = f"circle, diameter {arena['diameter_m'] * 100:.4g} cm"
+    elif arena["shape"] == "rectangle":
+        size = f"rectangle, {arena['width_m'] * 100:.4g} x {arena['height_m'] * 100:.4g} cm"
+    else:
+        size = f"polygon with {len(arena['vertices_m'])} vertices"
     found = described["arena_found"] or {}
     center = found.get("center_m")
     where = "" if center is None else f"; centre at x {center[0]:.4g} m, y {center[1]:.4g} m"
-    return sizes[arena["shape"]]() + where + (f" ({found['by']})" if "by" in found else "")
+    return size + where + (f" ({found['by']})" if "by" in found else "")
 
 
 def _scaled(value: Any, factor: float) -> Any:

@@ -18,7 +18,7 @@ from driftwalk.core.text_files import text_of_name
 
 if TYPE_CHECKING:
     from driftwalk.cli.recordings.tracking_parts import TrackingParts
-    from driftwalk.track import AssemblySeen, Camera, Frame, LiveServer, SeenEvent, TrackState
+    from driftwalk.track import AssemblySeen, Frame, LiveServer, TrackState
 
 VERSION: Final = 1
 """Version of the lines of JSON; a reader refuses another one."""
@@ -88,9 +88,15 @@ class LiveOutputs:
             When the frame came, on `time.perf_counter` [s].
         """
         if self._json is not None:
-            message = frame_message(frame, states, observed)
-            message["dropped_frames"] = dropped
-            message["latency_s"] = clock.perf_counter() - arrived
+            message = {
+                "type": "frame",
+                "frame": frame.index,
+                "time_s": frame.time,
+                "bodies": [_body(state) for state in states],
+                **_assembly(observed),
+                "dropped_frames": dropped,
+                "latency_s": clock.perf_counter() - arrived,
+            }
             self._json.publish(message, frame.image)
         if self._nmea is not None:
             self._nmea.publish((frame.index, self._particles(states)))
@@ -127,31 +133,10 @@ def hello(options: TrackingOptions, parts: TrackingParts, source: str) -> dict[s
         "block_side_m": parts.block_side,
         "body_count": options.bodies,
         "observed": parts.observer is not None,
-        "image": _image(parts.camera),
-    }
-
-
-def _image(camera: Camera) -> dict[str, Any]:
-    """Return the size of the images, and how their pixels become metres."""
-    lens = camera.lens
-    return {
-        "width_px": camera.width_px,
-        "height_px": camera.height_px,
-        "homography_px_to_m": camera.homography_px_to_m,
-        "lens": None if lens is None else lens.model_dump(),
-    }
-
-
-def frame_message(
-    frame: Frame, states: Sequence[TrackState], observed: AssemblySeen | None
-) -> dict[str, Any]:
-    """Return a frame's line, without what is known only when it is sent."""
-    return {
-        "type": "frame",
-        "frame": frame.index,
-        "time_s": frame.time,
-        "bodies": [_body(state) for state in states],
-        **_assembly(observed),
+        # The size of the images, and how their pixels become metres.
+        "image": parts.camera.model_dump(
+            include={"width_px", "height_px", "homography_px_to_m", "lens"}
+        ),
     }
 
 
@@ -181,15 +166,8 @@ def _assembly(observed: AssemblySeen | None) -> dict[str, Any]:
         "outcome": observed.outcome or None,
         "possible": sorted(observed.possible) or None,
         "hidden": observed.hidden,
-        "events": [_event(event) for event in observed.events],
-    }
-
-
-def _event(event: SeenEvent) -> dict[str, Any]:
-    return {
-        "time_s": event.time,
-        "kind": event.kind,
-        "bodies": list(event.bodies),
-        "faces": list(event.faces),
-        "outcome": event.outcome,
+        "events": [
+            {"time_s": time, "kind": kind, "bodies": bodies, "faces": faces, "outcome": outcome}
+            for time, kind, bodies, faces, outcome in observed.events
+        ],
     }

@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 import typer
 
-from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.shared_types import Replace, option
 from driftwalk.cli.options.tracking import TrackingOptions
@@ -22,6 +21,7 @@ _REMEDY = (
 markers_app = typer.Typer(add_completion=False, cls=HelpGroup)
 
 
+@markers_app.command(cls=HelpCommand)
 @with_options(TrackingOptions, "source", "camera", "tank", "scale", "fps", "side")
 def teach(
     options: TrackingOptions,
@@ -73,9 +73,6 @@ def teach(
     scale = [f"--{name}={value}" for name, value in stated.items() if value is not None]
     recording = out.with_suffix(".nc")
     print_next("track", Path(options.source), "--markers", out, *scale, "-o", recording)
-
-
-markers_app.command("teach", cls=HelpCommand, help=paragraphs(teach.__doc__ or ""))(teach)
 
 
 @markers_app.callback()

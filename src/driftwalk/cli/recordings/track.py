@@ -10,10 +10,10 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared_types import Json, Replace, option
+from driftwalk.cli.options.shared_types import Json, Replace, optional
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.recordings.live_output import LiveOutputs
 from driftwalk.cli.terminal.output import (
@@ -41,18 +41,14 @@ _SHOWN = {"duplicates": "doubled"}
 @with_options(TrackingOptions)
 def track(
     options: TrackingOptions,
-    out: Annotated[
-        Path | None, option("--out -o FILE.nc", "Recording to write; needed without --explain.")
-    ] = None,
-    explain: Annotated[
-        int | None,
-        option(
-            "--explain FRAME",
-            "Write a PNG of this frame that shows each candidate and why it was "
-            "rejected, then exit.",
-            min=0,
-        ),
-    ] = None,
+    out: Path | None = optional(
+        "--out -o FILE.nc", "Recording to write; needed without --explain."
+    ),
+    explain: int | None = optional(
+        "--explain FRAME",
+        "Write a PNG of this frame that shows each candidate and why it was rejected, then exit.",
+        min=0,
+    ),
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:
@@ -191,7 +187,7 @@ class TrackingRun:
         KeyboardInterrupt
             When a file was interrupted; a camera's recording ends that way.
         """
-        from driftwalk.track import frame_count, open_source
+        from driftwalk.track import OverlayWriter, frame_count, open_source
 
         total = frame_count(self.options.source) or 0
         source = open_source(self.options.source, rate=self.options.fps)
@@ -201,7 +197,10 @@ class TrackingRun:
             open_things.callback(source.close)
             open_things.enter_context(_termination_as_interrupt())
             live = LiveOutputs(self.options, self.parts, self.source_name, open_things)
-            overlay = self._open_overlay(open_things)
+            overlay = None
+            if self.options.overlay is not None:
+                overlay = OverlayWriter(self.options.overlay)
+                open_things.callback(overlay.close)
             progress = open_things.enter_context(ProgressReporter("track"))
             try:
                 for frame in source:
@@ -209,7 +208,8 @@ class TrackingRun:
                     self._take(frame, source.waited_s, live, overlay)
                     dropped = self._source_counts["dropped"]
                     tell_progress(progress, frame.index + 1, total, dropped)
-                    self._save_now_and_then()
+                    if clock.monotonic() - self._saved >= self._pause:
+                        self._save(complete=False)
                 self.interrupted = source.interrupted
             except KeyboardInterrupt:
                 self.interrupted = f"interrupted after {self.frames} frames"
@@ -305,19 +305,6 @@ class TrackingRun:
             self._left_out.add(name)
             print_note(f"warning: {name} is one more than --bodies; joins are reported without it")
         return {name: pose for name, pose in seen.items() if name in self._names}
-
-    def _open_overlay(self, open_things: contextlib.ExitStack) -> OverlayWriter | None:
-        from driftwalk.track import OverlayWriter
-
-        if self.options.overlay is None:
-            return None
-        writer = OverlayWriter(self.options.overlay)
-        open_things.callback(writer.close)
-        return writer
-
-    def _save_now_and_then(self) -> None:
-        if clock.monotonic() - self._saved >= self._pause:
-            self._save(complete=False)
 
     def _save(self, *, complete: bool) -> None:
         from driftwalk.record import save_trajectory

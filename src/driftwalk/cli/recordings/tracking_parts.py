@@ -198,7 +198,11 @@ def tracker_for(options: TrackingOptions, camera: Camera, diameter: float | None
     """Return the tracker; its scales of speed and of clutter are those of the picture."""
     from driftwalk.track import Tracker, TrackerSettings
 
-    wide = _width(camera, diameter)
+    wide = diameter
+    if wide is None:
+        # As wide as what the camera sees.
+        corners = np.array([[0.0, 0.0], [camera.width_px - 1.0, camera.height_px - 1.0]])
+        wide = math.dist(*camera.to_world(corners).tolist())
     given = {
         "max_speed": options.max_speed if options.max_speed is not None else wide,
         "bodies": options.bodies,
@@ -209,14 +213,6 @@ def tracker_for(options: TrackingOptions, camera: Camera, diameter: float | None
     }
     settings: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     return Tracker(TrackerSettings(**settings))
-
-
-def _width(camera: Camera, diameter: float | None) -> float:
-    """Return the width of the tank, or of what the camera sees [m]."""
-    if diameter is not None:
-        return diameter
-    corners = np.array([[0.0, 0.0], [camera.width_px - 1.0, camera.height_px - 1.0]])
-    return math.dist(*camera.to_world(corners).tolist())
 
 
 def _observer(options: TrackingOptions, side: float | None) -> AssemblyObserver | None:

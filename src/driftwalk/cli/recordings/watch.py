@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared_types import Replace, option
+from driftwalk.cli.options.shared_types import Replace, optional
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_note, print_warnings, printable
 from driftwalk.core.errors import InputError
@@ -26,7 +26,7 @@ _MOST_CLASSES = 6
 )
 def watch(
     options: TrackingOptions,
-    out: Annotated[Path | None, option("--out -o FILE.nc", "Recording to write as well.")] = None,
+    out: Path | None = optional("--out -o FILE.nc", "Recording to write as well."),
     overwrite: Replace = False,
 ) -> None:
     """Watch blocks assemble: poses, joins and the outcome class, as they happen.

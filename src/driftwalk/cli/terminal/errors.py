@@ -10,6 +10,7 @@ import contextlib
 import errno
 import os
 import sys
+from typing import Any
 
 import typer
 
@@ -98,9 +99,8 @@ def _is_of_a_sweep(error: BaseException) -> bool:
     return isinstance(error, SweepError)
 
 
-def _usage_message(error: BaseException) -> str:
-    text = error.format_message() if hasattr(error, "format_message") else str(error)
-    message = _joined(to_options(text))
+def _usage_message(error: Any) -> str:
+    message = _joined(to_options(error.format_message()))
     context = getattr(error, "ctx", None)
     if context is None:
         return message

@@ -80,19 +80,15 @@ def write_help(command: Any, ctx: Any, formatter: Any) -> None:
     options: list[Any] = []
     for one in command.get_params(ctx):
         (options if one.param_type_name == "option" else arguments).append(one)
-    names = [(one.metavar or one.name.upper()).strip("[]") for one in arguments]
+    rows = [((one.metavar or one.name.upper()).strip("[]"), one.help) for one in arguments]
     words = [
-        name if one.required else f"[{name}]" for name, one in zip(names, arguments, strict=True)
+        row[0] if one.required else f"[{row[0]}]" for row, one in zip(rows, arguments, strict=True)
     ]
     if hasattr(command, "commands"):
         words.append("COMMAND")
     formatter.write_usage(ctx.command_path, " ".join([*words, "[OPTIONS]"]))
     command.format_help_text(ctx, formatter)
-    _write(
-        formatter,
-        "Arguments",
-        [(name, one.help) for name, one in zip(names, arguments, strict=True)],
-    )
+    _write(formatter, "Arguments", rows)
     _write_commands(command, formatter)
     _write_options(options, ctx, formatter)
 

@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import TracebackType
 from typing import Any, Self, TextIO
 
 from driftwalk.core.progress import WHOLE
@@ -67,12 +66,7 @@ class ProgressReporter:
             self._start_bar()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         if self._bar is not None:
             self._bar.stop()
 
@@ -96,22 +90,18 @@ class ProgressReporter:
         now = self._clock()
         self._judge(done / total if total > 0 else 0.0, now)
         text = ", ".join(part for part in (text, self.remark()) if part)
+        count = _count(done, total)
         if self._bar is not None:
             title = f"{self._title} {text}".rstrip()
             self._bar.update(
-                self._task,
-                completed=done,
-                total=total,
-                description=title,
-                count=_count(done, total),
+                self._task, completed=done, total=total, description=title, count=count
             )
             return
         if now - self._last_line >= self._seconds_between_lines:
             self._last_line = now
             left = f", {self.left}" if self.left else ""
             remark = f": {text}" if text else ""
-            line = f"{self._title}: {_count(done, total)}{left}{remark}"
-            print(line, file=self._stream, flush=True)
+            print(f"{self._title}: {count}{left}{remark}", file=self._stream, flush=True)
 
     def _judge(self, share: float, now: float) -> None:
         """Judge when the work will end."""
