@@ -100,8 +100,7 @@ class ConvexPolygon:
         closing = -(normals @ np.stack([dx, dy]))
         with np.errstate(divide="ignore", invalid="ignore"):
             part = np.where(closing > 0.0, inside / closing, np.inf)
-        edge = part.argmin(axis=0)
-        return np.clip(part.min(axis=0), 0.0, 1.0), normals[edge]
+        return np.clip(part.min(axis=0), 0.0, 1.0), normals[part.argmin(axis=0)]
 
     def _normals(self) -> Floats:
         corners = np.asarray(self.corners)
