@@ -15,7 +15,8 @@ from driftwalk.conditions import Neighbours
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.random_streams import world_keys
 from driftwalk.motion.choose import family_model
-from driftwalk.motion.family import MEMBERS, PARTS
+from driftwalk.motion.family.members import MEMBERS
+from driftwalk.motion.family.parts import PARTS
 from driftwalk.motion.family.columns import (
     INERTIAL,
     SHARED,
