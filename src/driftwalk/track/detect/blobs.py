@@ -176,8 +176,7 @@ class BlobDetector:
         """
         cv2 = self._cv2
         difference = self._difference(image)
-        limit = self._limit(difference)
-        mask = np.greater(difference, limit).view(np.uint8)
+        mask = np.greater(difference, self._limit(difference)).view(np.uint8)
         count, label, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
         areas = stats[1:, cv2.CC_STAT_AREA]
         kept, rejected = [], []
@@ -224,8 +223,7 @@ class BlobDetector:
         """Return the least difference that is no noise."""
         if self._contrast is not None:
             return self._contrast
-        counts = np.bincount(difference[::4, ::4].ravel(), minlength=256)
-        total = np.cumsum(counts)
+        total = np.cumsum(np.bincount(difference[::4, ::4].ravel(), minlength=256))
         noise = float(np.searchsorted(total, 0.84 * total[-1]))
         peak = float(np.searchsorted(total, total[-1] - max(self._least / 32.0, 1.0)))
         return max(_BLOBS.least_contrast, _BLOBS.noise_factor * noise, _BLOBS.share_of_peak * peak)

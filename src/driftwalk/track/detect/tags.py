@@ -104,8 +104,7 @@ class TagDetector:
         up = np.array([1.0, -1.0])
         world = corners * up if self.camera is None else self.camera.to_world(corners)
         slopes = np.diag(up) if self.camera is None else self.camera.jacobian(pixel[None])[0]
-        edges = (world[1] - world[0]) + (world[2] - world[3])
-        along = edges / 2
+        along = ((world[1] - world[0]) + (world[2] - world[3])) / 2
         turn = np.array([-along[1], along[0]]) / float(along @ along)
         covariance = np.zeros((3, 3))
         # A corner of a tag is known to 0.15 px; chosen by hand.

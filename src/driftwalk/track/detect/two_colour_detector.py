@@ -66,7 +66,7 @@ class Disc:
     column: float
     row: float
     area: float
-    box: tuple[float, float, float, float]
+    box: tuple[float, ...]
     share: float
     diameter: float
 
@@ -187,12 +187,7 @@ def _together(first: Disc, second: Disc) -> Disc:
         a * first.column + b * second.column,
         a * first.row + b * second.row,
         area,
-        (
-            min(first.box[0], second.box[0]),
-            min(first.box[1], second.box[1]),
-            max(first.box[2], second.box[2]),
-            max(first.box[3], second.box[3]),
-        ),
+        (*map(min, first.box[:2], second.box[:2]), *map(max, first.box[2:], second.box[2:])),
         first.share + second.share,
         first.diameter,
     )
