@@ -105,14 +105,10 @@ def track_steps(trajectory: xr.Dataset) -> FoundSteps:
     if "ambiguous" in trajectory:
         unsure = (trajectory["ambiguous"].values.T > 0.0)[body, row]
         sure = ~(unsure[first] | unsure[first + 1])
-    steps = Steps(
-        body[first],
-        first,
-        0.5 * (time[first] + time[first + 1]),
-        interval,
-        0.5 * (position[first] + position[first + 1]),
-        (position[first + 1] - position[first]) / interval[:, None],
-    )
+    begin, end = position[first], position[first + 1]
+    moment, middle = 0.5 * (time[first] + time[first + 1]), 0.5 * (begin + end)
+    velocity = (end - begin) / interval[:, None]
+    steps = Steps(body[first], first, moment, interval, middle, velocity)
     return FoundSteps(
         steps.select(near & sure),
         across_gaps=int(np.count_nonzero(~near)),

@@ -131,8 +131,7 @@ def model_of_file(
         try:
             found = found()
         except Exception as error:
-            text = _error_text(path, error)
-            raise ConfigurationError(f"{name}() failed: {text}") from error
+            raise ConfigurationError(f"{name}() failed: {_error_text(path, error)}") from error
     if isinstance(found, MotionModel):
         if parameters or ranges or settings != "one":
             raise ConfigurationError(

@@ -149,13 +149,9 @@ def camera_from_rim(image: Image, *, diameter: float, lens: Lens | None = None) 
     if not (math.isfinite(diameter) and diameter > 0.0):
         raise InputError(f"a tank's diameter must be above zero metres, got {diameter}")
     rim = find_rim(image, lens)
-    camera = Camera.from_scale(
-        image.shape[1],
-        image.shape[0],
-        px_per_m=2.0 * rim.radius_px / diameter,
-        centre_px=(rim.column, rim.row),
-        lens=lens,
-    )
+    (rows, columns), scale = image.shape[:2], 2.0 * rim.radius_px / diameter
+    centre = (rim.column, rim.row)
+    camera = Camera.from_scale(columns, rows, px_per_m=scale, centre_px=centre, lens=lens)
     return camera.model_copy(update={"plane_found_by": "rim", "tank_diameter_m": diameter})
 
 

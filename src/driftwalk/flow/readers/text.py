@@ -148,15 +148,9 @@ def read(path: Path, options: TextOptions) -> RawField:
         length, velocity = program.units_in(text)
     if not layout.header and (unread := names.count("")):
         notes.append(f"columns beyond x, y, u, v have no name and are not read: {unread}")
-    return RawField(
-        rows,
-        length,
-        velocity,
-        down=program.counts_down(rows.y),
-        frame_interval=program.interval_in(text),
-        notes=notes,
-        reading=_described(layout, places, list(marks)),
-    )
+    down, interval = program.counts_down(rows.y), program.interval_in(text)
+    reading = _described(layout, places, list(marks))
+    return RawField(rows, length, velocity, down, interval, notes, reading)
 
 
 def _marks(layout: Layout) -> dict[int, Callable[[Floats], npt.NDArray[np.bool_]]]:

@@ -182,13 +182,8 @@ def raw_to_si(raw: RawField, options: FieldOptions) -> tuple[FieldRows, list[str
     down = found if options.y_axis is None else options.y_axis == "down"
     sign = -1.0 if down else 1.0
     x0, y0 = options.origin or (0.0, 0.0)
-    si = FieldRows(
-        rows.line,
-        length * rows.x - x0,
-        sign * length * rows.y - y0,
-        velocity * rows.u,
-        sign * velocity * rows.v,
-    )
+    x, y = length * rows.x - x0, sign * length * rows.y - y0
+    si = FieldRows(rows.line, x, y, velocity * rows.u, sign * velocity * rows.v)
     notes = [*raw.notes]
     if found and options.y_axis is None:
         notes.append("y counts downwards in the file: y and v are negated (`y_axis`)")

@@ -112,18 +112,10 @@ class TagDetector:
         covariance[:2, :2] = one / 4
         # Four corners, each with half of the turn of its edge.
         covariance[2, 2] = float(turn @ one @ turn)
-        place = _crossing(world)
-        calibrated = self.camera is not None
-        return Detection(
-            x=float(place[0]) if calibrated else None,
-            y=float(place[1]) if calibrated else None,
-            column=float(pixel[0]),
-            row=float(pixel[1]),
-            theta=math.remainder(math.atan2(along[1], along[0]) - self._offset, 2 * math.pi),
-            covariance=covariance,
-            area_px=_area(corners),
-            key=name,
-        )
+        x, y = (None, None) if self.camera is None else _crossing(world).tolist()
+        column, row = pixel.tolist()
+        theta = math.remainder(math.atan2(along[1], along[0]) - self._offset, 2 * math.pi)
+        return Detection(x, y, column, row, theta, covariance, _area(corners), key=name)
 
 
 def _crossing(corners: Floats) -> Floats:

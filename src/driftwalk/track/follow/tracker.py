@@ -301,17 +301,10 @@ class Tracker:
     def _state(self, track: Track) -> TrackState:
         assert track.body is not None
         x, y, theta, vx, vy, omega = track.mean.tolist()
-        return TrackState(
-            self._naming.names[track.body],
-            x,
-            y,
-            theta if track.oriented else math.nan,
-            vx,
-            vy,
-            omega if track.oriented else math.nan,
-            track.measured,
-            track.score,
-        )
+        if not track.oriented:
+            theta = omega = math.nan
+        name = self._naming.names[track.body]
+        return TrackState(name, x, y, theta, vx, vy, omega, track.measured, track.score)
 
 
 def _obey_keys(cost: Floats, tracks: Sequence[Track], found: Sequence[Detection]) -> None:
