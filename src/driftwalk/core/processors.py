@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from threading import Event, Lock
 from typing import Any, TypeVar
 
@@ -111,7 +111,7 @@ class Cancelled(Exception):
     """Ends work whose result is no longer needed."""
 
 
-class CancelOnError:
+class CancelOnError(AbstractContextManager["CancelOnError"]):
     """A block that waits for work of other threads, and ends it when an error or Ctrl-C ends it.
 
     Examples
@@ -122,9 +122,6 @@ class CancelOnError:
 
     def __init__(self) -> None:
         self._cancelled = Event()
-
-    def __enter__(self) -> CancelOnError:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is not None:

@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import reduce
 from operator import xor
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.extras import require_opencv
@@ -45,7 +45,7 @@ class _Message(NamedTuple):
     image: Image | None
 
 
-class LiveServer:
+class LiveServer(contextlib.AbstractContextManager["LiveServer"]):
     """Sends messages to every client that is connected.
 
     Parameters
@@ -91,10 +91,6 @@ class LiveServer:
         self._changed = threading.Condition()
         self._clients: list[_Client] = []
         threading.Thread(target=self._welcome, daemon=True).start()
-
-    def __enter__(self) -> Self:
-        """Return the server."""
-        return self
 
     def __exit__(self, *error: object) -> None:
         """Close the server."""

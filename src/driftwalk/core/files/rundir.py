@@ -217,14 +217,12 @@ class RunDirectory:
 
     def _must_move(self, state: State) -> bool:
         """Return whether what is there has to be moved away; raise when it must not be."""
-        if state == "new":
-            return False
-        if state == "finished":
-            if not self._overwrite:
-                raise RunDirectoryError(
-                    f"{self.path} holds a finished run; choose another directory or {_OVERWRITE}"
-                )
-            return True
+        if state == "finished" and not self._overwrite:
+            raise RunDirectoryError(
+                f"{self.path} holds a finished run; choose another directory or {_OVERWRITE}"
+            )
+        if state != "unfinished":
+            return state == "finished"
         stored = read_specification(self.path / RECORD_FILE)
         if self._overwrite:
             return bool(stored["fingerprint"] != fingerprint_of(self.specification))

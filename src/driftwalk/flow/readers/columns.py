@@ -69,11 +69,6 @@ class Column(NamedTuple):
     base: str
     """The name without its unit, in small letters."""
 
-    @property
-    def in_metres(self) -> bool:
-        """Whether the unit is one of length, and no pixels."""
-        return bool(self.unit) and not self.unit.lower().startswith(("px", "pix"))
-
 
 def column_of(name: str) -> Column:
     """Return what the name of a column says.
@@ -145,8 +140,9 @@ def choose_columns(names: Sequence[str], stated: Mapping[str, str]) -> dict[str,
         if wanted in stated:
             found[wanted] = _stated(stated[wanted], names, known)
             continue
+        # A column in metres rather than one in pixels, or without a unit.
         ranks = sorted(
-            (not one.in_metres, one.base != wanted, at)
+            (not one.unit or one.unit.lower().startswith(("px", "pix")), one.base != wanted, at)
             for at, one in enumerate(known)
             if one.quantity == wanted
         )

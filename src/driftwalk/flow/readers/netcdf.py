@@ -9,7 +9,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.flow.grid import round_nodes
-from driftwalk.flow.readers.units import FieldOptions, FieldScale
+from driftwalk.flow.readers.units import FieldOptions, FieldScale, factor_to, words_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -193,7 +193,7 @@ def _with_times(chosen: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
         return mean, [f"the flow is the mean of {count} frames: the file holds no times"]
     try:
         # "seconds since ..." counts from a date that nothing here needs.
-        factor = FieldScale(FieldOptions()).time(unit.split(" since ")[0])
+        factor = factor_to(words_of_unit(unit.split(" since ")[0]), "s")
     except InputError as error:
         raise FormatError(f"the units of 'time' are '{unit}': {error}") from error
     return chosen.assign_coords(time=factor * chosen["time"].values.astype(np.float64)), []

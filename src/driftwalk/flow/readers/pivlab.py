@@ -193,10 +193,8 @@ def _units(file: _File) -> tuple[str, str, Floats]:
 
 
 def _factor(file: _File, names: tuple[str, ...]) -> float:
-    for name in names:
-        if name in file.names:
-            return float(np.ravel(file.read(name)[0])[0])
-    return 1.0
+    name = next((one for one in names if one in file.names), None)
+    return 1.0 if name is None else float(np.ravel(file.read(name)[0])[0])
 
 
 def _text(arrays: list[Any]) -> str:

@@ -93,7 +93,7 @@ class FieldScale:
             When the unit is none of length, or a fact is missing.
         """
         known = words_of_unit(unit) or self._stated()
-        return self._metres_per_pixel() if known == "px" else _parse(known, "m")
+        return self._metres_per_pixel() if known == "px" else factor_to(known, "m")
 
     def velocity(self, unit: str) -> float:
         """Return the metres per second of a velocity in some unit, as `length` does."""
@@ -106,12 +106,8 @@ class FieldScale:
         if known.endswith("/frame"):
             return self.length(known.removesuffix("/frame")) / self._frame_interval()
         if known.startswith("px"):
-            return self._metres_per_pixel() * _parse(f"m{known.removeprefix('px')}", "m/s")
-        return _parse(known, "m/s")
-
-    def time(self, unit: str) -> float:
-        """Return the seconds per unit of a time."""
-        return _parse(words_of_unit(unit), "s")
+            return self._metres_per_pixel() * factor_to(f"m{known.removeprefix('px')}", "m/s")
+        return factor_to(known, "m/s")
 
     def in_pixels(self, unit: str) -> bool:
         """Return whether positions of a unit are in pixels."""
@@ -210,7 +206,14 @@ def words_of_unit(text: str) -> str:
     ).strip()
 
 
-def _parse(unit: str, wanted: str) -> float:
+def factor_to(unit: str, wanted: str) -> float:
+    """Return the factor from a unit, in the words of `words_of_unit`, to one in SI.
+
+    Raises
+    ------
+    InputError
+        When it is no such unit, or degrees.
+    """
     if _DEGREES.fullmatch(unit.split(" ")[0]):
         raise InputError(
             "the positions are degrees of longitude and latitude: project the field to metres "
@@ -218,7 +221,7 @@ def _parse(unit: str, wanted: str) -> float:
         )
     word = re.match(r"[A-Za-z]*", unit)
     if word is not None and word[0].lower() in _IMPERIAL:
-        return _IMPERIAL[word[0].lower()] * _parse(f"m{unit[word.end() :]}", wanted)
+        return _IMPERIAL[word[0].lower()] * factor_to(f"m{unit[word.end() :]}", wanted)
     try:
         return parse_quantity(f"1 {unit}", wanted)
     except ConfigurationError as error:
