@@ -83,7 +83,7 @@ class ConvexPolygon:
     def leave(self, x: Floats, y: Floats, dx: Floats, dy: Floats) -> tuple[Floats, Floats]:
         """Return where the way from an inside point to an outside point crosses the wall.
 
-        Parameters and values are those of `Circle.leave`.
+        Parameters and values are as in `Circle.leave`.
         """
         inside, normals = self._distances(x, y), self._normals()
         closing = -(normals @ np.stack([dx, dy]))
