@@ -38,7 +38,7 @@ def test_the_walk_sees_every_kind_of_text() -> None:
     assert OPTION.search("needs its {} (--{})")
     assert not OPTION.search("a -- b, ---, x--y, `port`")
     assert any("`tank` of `load`" in text for _, text in messages())
-    assert any("(`{}`)" in text for _, text in messages())
+    assert any("give `{}`, which" in text for _, text in messages())
 
 
 def test_no_message_of_the_library_names_an_option() -> None:

@@ -47,7 +47,8 @@ def compute(path, seed, mode="resume", pause_s=0.0, threads=0, units={UNITS}):
     global PAUSE_S, SEED
     PAUSE_S, SEED = pause_s, seed
     pool = ThreadPoolExecutor(threads) if threads else None
-    with RunDirectory(path, specification={{"seed": seed}}, on_existing=mode) as run:
+    again = mode == "overwrite"
+    with RunDirectory(path, specification={{"seed": seed}}, overwrite=again) as run:
         design = grid(scale=np.linspace(1.0, 2.0, 2 * units))
         coarse = run_sweep(function, design.units(2), store=run.store("coarse"), executor=pool)
         fine = grid(scale=[float(coarse["x"].min()), float(coarse["x"].max())])

@@ -59,8 +59,7 @@ def remembered(call: Callable[P, T]) -> Callable[P, T]:
                 digest.update(f"{name} {whole.dtype} {whole.shape} ".encode())
                 digest.update(whole.tobytes())
         key = digest.digest()
-        known = results.get(key)
-        if known is not None:
+        if (known := results.get(key)) is not None:
             return known
         found = call(*args, **kwargs)
         results[key] = found

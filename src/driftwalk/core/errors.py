@@ -72,11 +72,8 @@ class FormatError(InputError):
         self.path = path
         self.line = line
         self.column = column
-        where = str(path) if path is not None else ""
-        if line is not None:
-            where += f", line {line}" if where else f"line {line}"
-        if column is not None:
-            where += f", column {column}"
+        places = (("", path), ("line ", line), ("column ", column))
+        where = ", ".join(f"{what}{place}" for what, place in places if place is not None)
         super().__init__(f"{where}: {message}" if where else message)
 
 

@@ -55,12 +55,9 @@ def read_image(path: str | Path) -> Any:
     Traceback (most recent call last):
     driftwalk.core.errors.FormatError: no/such.png: is not an image that OpenCV can read
     """
-    cv2 = require_opencv()
-    try:
-        with _without_stderr():
-            image = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    except cv2.error as error:
-        raise FormatError("is not an image that OpenCV can read", path=path) from error
+    cv2, image = require_opencv(), None
+    with _without_stderr(), contextlib.suppress(cv2.error):
+        image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
         raise FormatError("is not an image that OpenCV can read", path=path)
     return image

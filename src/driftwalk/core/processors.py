@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from threading import Lock
+from contextlib import AbstractContextManager, contextmanager
+from threading import Event, Lock
 from typing import Any, TypeVar
 
 from driftwalk.core.progress import Progress
@@ -104,19 +103,15 @@ def _let_any_thread_limit() -> None:
     import threadpoolctl
 
     openblas = getattr(threadpoolctl, "OpenBLASController", None)
-    clear = getattr(openblas, "clear_controlling_thread", None)
-    if clear is not None:
+    if (clear := getattr(openblas, "clear_controlling_thread", None)) is not None:
         clear(force=True)
-
-
-Result = TypeVar("Result")
 
 
 class Cancelled(Exception):
     """Ends work whose result is no longer needed."""
 
 
-class CancelOnError:
+class CancelOnError(AbstractContextManager["CancelOnError"]):
     """A block that waits for work of other threads, and ends it when an error or Ctrl-C ends it.
 
     Examples
@@ -126,10 +121,7 @@ class CancelOnError:
     """
 
     def __init__(self) -> None:
-        self._cancelled = threading.Event()
-
-    def __enter__(self) -> CancelOnError:
-        return self
+        self._cancelled = Event()
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is not None:
@@ -142,8 +134,8 @@ class CancelOnError:
 
 
 def run_in_background(
-    work: Callable[[Progress], Result], meanwhile: Callable[[], object]
-) -> Result:
+    work: Callable[[Progress], FoundT], meanwhile: Callable[[], object]
+) -> FoundT:
     """Return what some work gives; it goes on in another thread during `meanwhile`.
 
     Parameters

@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path, PurePath
 from typing import Any, Final
@@ -91,11 +92,13 @@ def manifest(
     >>> made["seeds"]
     {'calibration': 1}
     """
+    import shlex
+
     return {
         "kind": MANIFEST_KIND,
         "manifest_version": MANIFEST_VERSION,
         "created_utc": utc_now(),
-        "command": text_of_name(command if isinstance(command, str) else _joined(command)),
+        "command": text_of_name(command if isinstance(command, str) else shlex.join(command)),
         "study": plain(study),
         "seeds": plain(seeds),
         "inputs": {role: describe_file(path) for role, path in inputs.items()},
@@ -107,8 +110,7 @@ def manifest(
 def describe_file(path: str | Path) -> dict[str, Any]:
     """Return path, SHA-256 and size [byte] of a file."""
     sha256 = file_sha256(path)
-    size = Path(path).stat().st_size
-    return {"path": text_of_name(path), "sha256": sha256, "size_bytes": size}
+    return {"path": text_of_name(path), "sha256": sha256, "size_bytes": Path(path).stat().st_size}
 
 
 def write_manifest(path: str | Path, values: Mapping[str, Any]) -> None:
@@ -259,12 +261,6 @@ def _leaves(value: dict[str, Any], prefix: str = "") -> dict[str, str]:
     return leaves
 
 
-def _joined(words: Sequence[str]) -> str:
-    import shlex
-
-    return shlex.join(words)
-
-
 def package_versions(names: Iterable[str]) -> dict[str, str]:
     """Return the versions of packages that are installed; others are left out.
 
@@ -284,10 +280,8 @@ def package_versions(names: Iterable[str]) -> dict[str, str]:
 
     versions = {}
     for name in names:
-        try:
+        with suppress(PackageNotFoundError):
             versions[name] = __version__ if name == "driftwalk" else version(name)
-        except PackageNotFoundError:
-            continue
     return versions
 
 
@@ -302,15 +296,13 @@ def _machine(instruction_set: str | None) -> dict[str, Any]:
     import os
     import platform
 
-    machine: dict[str, Any] = {
+    return {
         "platform": platform.platform(),
         "architecture": platform.machine(),
         "processor": _processor_name() or platform.processor() or "unknown",
         "cpu_count": os.cpu_count(),
+        **({} if instruction_set is None else {"instruction_set": instruction_set}),
     }
-    if instruction_set is not None:
-        machine["instruction_set"] = instruction_set
-    return machine
 
 
 def _processor_name() -> str | None:

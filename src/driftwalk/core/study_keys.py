@@ -192,8 +192,7 @@ def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> 
     >>> study_overrides(keys=FIT_KEYS, mass="11.6±0.2 g")
     {'block.mass_kg': '11.6 g', 'fit.mass_std_kg': '0.2 g'}
     """
-    unknown = [name for name in options if name not in keys]
-    if unknown:
+    if unknown := [name for name in options if name not in keys]:
         advice = did_you_mean(unknown[0], keys) or f"; there are {', '.join(keys)}"
         raise ConfigurationError(f"there is no argument '{unknown[0]}'{advice}")
     overrides: dict[str, Any] = {}

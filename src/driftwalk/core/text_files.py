@@ -281,15 +281,14 @@ def parse_toml(text: str | bytes, *, path: str | Path | None = None) -> dict[str
     """
     try:
         plain = text if isinstance(text, str) else text.decode("utf-8-sig")
-        if _LONG_KEY.search(plain):
-            raise FormatError(
-                f"not a file that driftwalk reads: a key of more than {MOST_PARTS} parts", path=path
-            )
-        values = tomllib.loads(plain)
     except UnicodeDecodeError as error:
         raise FormatError(f"not a text file in UTF-8 ({error.reason})", path=path) from error
-    except FormatError:
-        raise
+    if _LONG_KEY.search(plain):
+        raise FormatError(
+            f"not a file that driftwalk reads: a key of more than {MOST_PARTS} parts", path=path
+        )
+    try:
+        values = tomllib.loads(plain)
     except RecursionError:
         raise FormatError("not a TOML file: values nested too deeply", path=path) from None
     except ValueError as error:

@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 
 from driftwalk.core.errors import ConfigurationError
 
-Dimension = tuple[int, int, int, int]
+Dimension = tuple[int, ...]
 
 
 class _Unit(NamedTuple):
@@ -95,10 +95,10 @@ def parse_quantity(text: str | float, unit: str) -> float:
     0.00055
     """
     if isinstance(text, bool) or not isinstance(text, (str, int, float)):
-        raise ConfigurationError(f"expected {_expected(unit)}, got {text!r}")
+        raise _refusal(unit, repr(text))
     value = _parse_text(text, unit) if isinstance(text, str) else _to_float(text)
     if not math.isfinite(value):
-        raise ConfigurationError(f"expected {_expected(unit)}, got {text!r}, which is not finite")
+        raise _refusal(unit, f"{text!r}, which is not finite")
     return value
 
 
@@ -113,7 +113,7 @@ def _parse_text(text: str, unit: str) -> float:
     match = _NUMBER.fullmatch(text)
     if match is None or match[2].startswith(","):
         hint = "; use a decimal point" if re.search(r"\d,\d", text) else ""
-        raise ConfigurationError(f"expected {_expected(unit)}, got '{text}'{hint}")
+        raise _refusal(unit, f"'{text}'{hint}")
     number, symbol = float(match[1]), match[2]
     if not symbol:
         return number
@@ -121,9 +121,7 @@ def _parse_text(text: str, unit: str) -> float:
         symbol = f"1{symbol}"
     given, wanted = _parse_unit(symbol, text, unit), _parse_unit(unit, text, unit)
     if given.dimension != wanted.dimension:
-        raise ConfigurationError(
-            f"expected {_expected(unit)}, got '{text}': '{symbol}' measures something else"
-        )
+        raise _refusal(unit, f"'{text}': '{symbol}' measures something else")
     if not math.isfinite(number):
         return number
     # Exact fractions, rounded once: 0.55 mN is the float that 0.00055 N is.
@@ -137,46 +135,31 @@ def _parse_unit(symbol: str, text: str, unit: str) -> _Unit:
     while position < len(symbol):
         match = _FACTOR.match(symbol, position)
         if match is None or (position == 0 and match[1]):
-            raise ConfigurationError(
-                f"expected {_expected(unit)}, got '{text}': cannot read the unit '{symbol}'"
-            )
+            raise _refusal(unit, f"'{text}': cannot read the unit '{symbol}'")
         # A slash divides by the factor after it alone, as in "kg/m s" written by hand.
         sign = -1 if match[1] == "/" else 1
         power = sign * int(match[3] or _SUPERSCRIPTS.get(match[4] or "", 1))
         if abs(power) > 9:
-            raise ConfigurationError(
-                f"expected {_expected(unit)}, got '{text}': the exponent {power} is out of range"
-            )
+            raise _refusal(unit, f"'{text}': the exponent {power} is out of range")
         factor = _lookup(match[2], text, unit)
         scale *= factor.scale**power
-        dimension = _add(dimension, factor.dimension, power)
+        pairs = zip(dimension, factor.dimension, strict=True)
+        dimension = tuple(before + power * own for before, own in pairs)
         position = match.end()
     return _Unit(scale, dimension)
 
 
-def _add(left: Dimension, right: Dimension, power: int) -> Dimension:
-    metre, kilogram, second, radian = (a + power * b for a, b in zip(left, right, strict=True))
-    return metre, kilogram, second, radian
-
-
 def _lookup(symbol: str, text: str, unit: str) -> _Unit:
     """Return one unit; an exact symbol comes before a prefix, so that "min" is a minute."""
-    if symbol in _FIXED:
-        return _FIXED[symbol]
-    if symbol in _PREFIXABLE:
-        return _PREFIXABLE[symbol]
+    if exact := _FIXED.get(symbol) or _PREFIXABLE.get(symbol):
+        return exact
     prefix, base = symbol[:1], symbol[1:]
     if prefix in _PREFIXES and base in _PREFIXABLE:
         return _Unit(_PREFIXES[prefix] * _PREFIXABLE[base].scale, _PREFIXABLE[base].dimension)
     if symbol.lower() in ("px", "pixel", "pixels"):
-        advice = "; give its size in metres (`metres_per_pixel`)"
-        raise ConfigurationError(
-            f"expected {_expected(unit)}, got '{text}': a pixel is not a unit"
-            f"{advice if unit == 'm' else ''}"
-        )
-    raise ConfigurationError(
-        f"expected {_expected(unit)}, got '{text}': unknown unit '{symbol}'{_suggestion(symbol)}"
-    )
+        advice = "; give its size in metres (`metres_per_pixel`)" if unit == "m" else ""
+        raise _refusal(unit, f"'{text}': a pixel is not a unit{advice}")
+    raise _refusal(unit, f"'{text}': unknown unit '{symbol}'{_suggestion(symbol)}")
 
 
 def _suggestion(symbol: str) -> str:
@@ -200,11 +183,11 @@ _EXAMPLES: Final = {
 }
 
 
-def _expected(unit: str) -> str:
-    if unit == "1":
-        return "a number"
+def _refusal(unit: str, got: str) -> ConfigurationError:
+    """Return the error of a text that is no quantity in a unit."""
     example = f" such as '{_EXAMPLES[unit]}'" if unit in _EXAMPLES else ""
-    return f"a number in {unit} or a quantity{example}"
+    expected = "a number" if unit == "1" else f"a number in {unit} or a quantity{example}"
+    return ConfigurationError(f"expected {expected}, got {got}")
 
 
 def percent(share: Any) -> str:

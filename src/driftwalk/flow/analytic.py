@@ -18,7 +18,7 @@ import numpy.typing as npt
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import outline_of
-from driftwalk.flow.grid import make_grid
+from driftwalk.flow.grid import make_grid, positions
 from driftwalk.schema import FLAGS, build_flow_field
 from driftwalk.schema.trajectory import read_arena
 
@@ -87,13 +87,12 @@ def vortex_velocity(
     >>> vortex_velocity(0.0, 0.1, angular_velocity=2.0)[0].tolist()
     -0.2
     """
-    at_x, at_y = _positions(x, y)
+    at_x, at_y = positions(x, y)
     rate: Floats | float = angular_velocity
     if core_radius is not None:
         if not core_radius > 0.0:
             raise InputError(f"core_radius must be positive, got {core_radius}")
-        beyond = np.maximum(at_x**2 + at_y**2, core_radius**2)
-        rate = angular_velocity * core_radius**2 / beyond
+        rate = angular_velocity * core_radius**2 / np.maximum(at_x**2 + at_y**2, core_radius**2)
     return -rate * at_y, rate * at_x
 
 
@@ -116,7 +115,7 @@ def shear_velocity(
     >>> shear_velocity(0.0, [0.0, 0.1], rate=0.5)[0].tolist()
     [0.0, 0.05]
     """
-    at_x, at_y = _positions(x, y)
+    at_x, at_y = positions(x, y)
     return rate * (at_y - at_rest), np.zeros_like(at_x)
 
 
@@ -171,7 +170,7 @@ def jets_velocity(
     for name, value in (("radius", radius), ("jet_width", jet_width)):
         if not value > 0.0:
             raise InputError(f"{name} must be positive, got {value}")
-    at_x, at_y = _positions(x, y)
+    at_x, at_y = positions(x, y)
     q = np.minimum(np.hypot(at_x, at_y) / radius, 1.0)
     # 4 q (1 - q) times the unit vectors: r cancels, so the centre needs no special case.
     bump = 4.0 * (1.0 - q) / radius
@@ -340,8 +339,7 @@ def jets_flow(*, diameter: float = 0.3, cells: int = 50, **jets: Any) -> xr.Data
     >>> jets_flow(swirl_speed=0.0).sizes["y"]
     50
     """
-    arena = {**TANK_30_CM, "diameter_m": diameter}
-    grid = {"arena": arena, "cells": cells}
+    grid = {"arena": {**TANK_30_CM, "diameter_m": diameter}, "cells": cells}
     return _named("jets", jets_velocity, {"radius": diameter / 2.0, **jets}, grid)
 
 
@@ -350,10 +348,3 @@ def _named(
 ) -> xr.Dataset:
     attrs = {"method": f"formula: {name}", "parameters": json.dumps(parameters)}
     return flow_from_function(partial(velocity, **parameters), attrs=attrs, **grid)
-
-
-def _positions(x: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Floats, Floats]:
-    at_x, at_y = np.broadcast_arrays(
-        np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    )
-    return at_x, at_y

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -14,31 +14,6 @@ from driftwalk.core.errors import InputError
 from driftwalk.schema.trajectory import read_arena
 
 SHAPES = ("circle", "rectangle", "polygon")
-
-
-class Outline(Protocol):
-    """A convex region of the plane."""
-
-    @property
-    def bounds(self) -> tuple[float, float, float, float]:
-        """Bounding box (x_min, y_min, x_max, y_max) [m]."""
-
-    def depth(self, x: Floats, y: Floats) -> Floats:
-        """Return the distance to the wall [m], negative outside."""
-
-    def normal(self, x: Floats, y: Floats) -> Floats:
-        """Return the unit normal into the tank of the wall nearest to each point, shape (n, 2)."""
-
-    def leave(self, x: Floats, y: Floats, dx: Floats, dy: Floats) -> tuple[Floats, Floats]:
-        """Return where the way from an inside point to an outside point crosses the wall.
-
-        Returns
-        -------
-        part : ndarray, shape (n,)
-            Part of the way (dx, dy) that lies inside, in [0, 1].
-        normal : ndarray, shape (n, 2)
-            Unit normal into the tank at the crossing.
-        """
 
 
 @dataclass(frozen=True)
@@ -59,14 +34,25 @@ class Circle:
         return self.radius - np.hypot(x - self.center[0], y - self.center[1])
 
     def normal(self, x: Floats, y: Floats) -> Floats:
-        """Return the unit normal into the tank; at the very centre, where all are as near, +x."""
+        """Return the unit normal into the tank of the wall nearest to each point, shape (n, 2).
+
+        At the very centre, where all of the wall is as near, it is +x.
+        """
         towards = np.column_stack([self.center[0] - x, self.center[1] - y])
         length = np.hypot(towards[:, 0], towards[:, 1])
         towards[length == 0.0] = (1.0, 0.0)
         return np.asarray(towards / np.where(length == 0.0, 1.0, length)[:, None])
 
     def leave(self, x: Floats, y: Floats, dx: Floats, dy: Floats) -> tuple[Floats, Floats]:
-        """Return where the way from an inside point to an outside point crosses the wall."""
+        """Return where the way from an inside point to an outside point crosses the wall.
+
+        Returns
+        -------
+        part : ndarray, shape (n,)
+            Part of the way (dx, dy) that lies inside, in [0, 1].
+        normal : ndarray, shape (n, 2)
+            Unit normal into the tank at the crossing.
+        """
         px, py = x - self.center[0], y - self.center[1]
         a, b = dx**2 + dy**2, px * dx + py * dy
         c = px**2 + py**2 - self.radius**2
@@ -95,13 +81,15 @@ class ConvexPolygon:
         return np.asarray(self._normals()[self._distances(x, y).argmin(axis=0)])
 
     def leave(self, x: Floats, y: Floats, dx: Floats, dy: Floats) -> tuple[Floats, Floats]:
-        """Return where the way from an inside point to an outside point crosses the wall."""
+        """Return where the way from an inside point to an outside point crosses the wall.
+
+        Parameters and values are as in `Circle.leave`.
+        """
         inside, normals = self._distances(x, y), self._normals()
         closing = -(normals @ np.stack([dx, dy]))
         with np.errstate(divide="ignore", invalid="ignore"):
             part = np.where(closing > 0.0, inside / closing, np.inf)
-        edge = part.argmin(axis=0)
-        return np.clip(part.min(axis=0), 0.0, 1.0), normals[edge]
+        return np.clip(part.min(axis=0), 0.0, 1.0), normals[part.argmin(axis=0)]
 
     def _normals(self) -> Floats:
         corners = np.asarray(self.corners)
@@ -114,6 +102,10 @@ class ConvexPolygon:
         corners, normals = np.asarray(self.corners), self._normals()
         offsets = np.sum(normals * corners, axis=1)
         return np.asarray(normals @ np.stack([x, y]) - offsets[:, None])
+
+
+Outline = Circle | ConvexPolygon
+"""A convex region of the plane."""
 
 
 def outline_of(arena: Mapping[str, Any] | str) -> Outline:

@@ -88,31 +88,19 @@ def average_cells(
     arrives[1:] = (np.diff(cell) != 0) | (np.diff(body) != 0) | (np.diff(time) > pause)
     visit = np.cumsum(arrives) - 1
     cell_of_visit = cell[arrives]
+    rows = np.column_stack([np.ones(cell.size), samples.velocity, samples.acceleration])[order]
+    own = _sum_by(visit, rows, cell_of_visit.size)
+    total = _sum_by(cell_of_visit, own, cells)
 
-    weight, velocity, acceleration = _visit_sums(visit, samples, order)
-    total = _sum_by(cell_of_visit, weight, cells)
-    total_velocity = _sum_by(cell_of_visit, velocity, cells)
-    total_acceleration = _sum_by(cell_of_visit, acceleration, cells)
+    def water(sums: Floats) -> Floats:
+        """Return the velocity of the water from count, velocities and accelerations."""
+        return sums[:, 1:3] / sums[:, :1] + correction(sums[:, 3:] / sums[:, :1])
+
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean_velocity = total_velocity / total
-        flow = mean_velocity + correction(total_acceleration / total)
-        rest = total[cell_of_visit] - weight
-        without = (total_velocity[cell_of_visit] - velocity) / rest
-        without += correction((total_acceleration[cell_of_visit] - acceleration) / rest)
-        visits = np.bincount(cell_of_visit, minlength=cells)
-        standard_error = _jackknife(without, cell_of_visit, visits)
-    return CellMeans(
-        total[:, 0].astype(np.intp), visits.astype(np.intp), mean_velocity, flow, standard_error
-    )
-
-
-def _visit_sums(visit: Indices, samples: Samples, order: Indices) -> tuple[Floats, Floats, Floats]:
-    number = int(visit[-1]) + 1 if visit.size else 0
-    return (
-        _sum_by(visit, np.ones((visit.size, 1)), number),
-        _sum_by(visit, samples.velocity[order], number),
-        _sum_by(visit, samples.acceleration[order], number),
-    )
+        velocity, flow = total[:, 1:3] / total[:, :1], water(total)
+        visits = np.bincount(cell_of_visit, minlength=cells).astype(np.intp)
+        error = _jackknife(water(total[cell_of_visit] - own), cell_of_visit, visits)
+    return CellMeans(total[:, 0].astype(np.intp), visits, velocity, flow, error)
 
 
 def _sum_by(group: Indices, values: Floats, groups: int) -> Floats:
@@ -122,8 +110,7 @@ def _sum_by(group: Indices, values: Floats, groups: int) -> Floats:
 
 def _jackknife(without: Floats, group: Indices, size: Indices) -> Floats:
     """Return the jackknife standard error of each group, NaN for groups of fewer than two."""
-    single = size[group] < 2
-    without = np.where(single[:, None], 0.0, without)
+    without = np.where((size[group] < 2)[:, None], 0.0, without)
     mean = _sum_by(group, without, size.size) / size[:, None]
     spread = _sum_by(group, (without - mean[group]) ** 2, size.size)
     error = np.sqrt(spread * ((size - 1) / size)[:, None])
@@ -233,8 +220,7 @@ def field_of_cells(
     share = measured_share(flag)
     used, beyond = settings["samples_used"], settings["samples_outside_tank"]
     cells = "the cells" if outline is None else "the tank's cells"
-    coverage = coverage_warnings(share, used=used, beyond=beyond, cells=cells)
-    warning = " ".join([*coverage, *doubts])
+    warning = " ".join([*coverage_warnings(share, used=used, beyond=beyond, cells=cells), *doubts])
     flow = fill_velocity(grid, means.flow.reshape(*grid.shape, 2), known=measured, outline=outline)
     error = np.where(measured[..., None], means.standard_error.reshape(*grid.shape, 2), np.nan)
     return build_flow_field(

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.smoothing import local_quadratic
-from driftwalk.flow.arena import Outline, outline_of
+from driftwalk.flow.arena import outline_of
 from driftwalk.flow.cell_means import Samples, average_cells, field_of_cells
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.schema import body_names, body_track, check_trajectory
@@ -134,9 +134,16 @@ def extract_flow(
     grid = make_grid(outline, cells=cells, cell_size=cell_size)
     settings: dict[str, Any] = {"inertia": inertia, "min_count": min_count, "window_s": window}
     correction: Callable[[Floats], Floats] = np.zeros_like
+    method = "cell means of a body's velocity, without inertia correction"
     if inertia == "corrected":
+        if mass is None:
+            raise InputError(
+                "the inertia correction needs the body's mass (`mass`); give it, or choose inertia "
+                '"none" for a body without inertia'
+            )
+        method = "cell means of a body's velocity, Eq. 4 with the mean acceleration"
         physics = {
-            "mass": _required(mass, "mass"),
+            "mass": mass,
             "area": cross_section(area, side, depth),
             "water_density": water_density,
             "flow_drag_coefficient": flow_drag_coefficient,
@@ -148,7 +155,8 @@ def extract_flow(
     smoothed = _smooth(trajectory, bodies, window, grid)
     # Smoothed before cells are formed: samples beyond the wall help the derivatives of those
     # within.
-    inside = _inside(smoothed, outline)
+    kept = (smoothed.samples.cell >= 0) & (outline.depth(*smoothed.position.T) >= 0.0)
+    inside = smoothed.samples.select(kept)
     means = average_cells(inside, cells=grid.size, pause=window, correction=correction)
     measured = means.count.reshape(grid.shape) >= min_count
     if not measured.any():
@@ -161,9 +169,6 @@ def extract_flow(
         arena=json.dumps(described),
         source=str(trajectory.attrs.get("source", "")),
     )
-    method = "cell means of a body's velocity, "
-    corrected = "Eq. 4 with the mean acceleration"
-    method += corrected if inertia == "corrected" else "without inertia correction"
     block = means.velocity.reshape(*grid.shape, 2)
     return field_of_cells(
         grid,
@@ -192,15 +197,6 @@ def _arena_of(trajectory: xr.Dataset, arena: Mapping[str, Any] | str | None) -> 
             '`load`, or `arena={"shape": "circle", "diameter_m": 0.3}` for a circle'
         )
     return read_arena(described)
-
-
-def _required(value: float | None, name: str) -> float:
-    if value is None:
-        raise InputError(
-            f"the inertia correction needs the body's {name} (`{name}`); "
-            'give it, or choose inertia "none" for a body without inertia'
-        )
-    return value
 
 
 def _chosen_bodies(trajectory: xr.Dataset, body: str | None) -> list[str]:
@@ -232,12 +228,6 @@ def _smooth(trajectory: xr.Dataset, bodies: list[str], window: float, grid: Grid
     cell = grid.cell_of(table[:, 1], table[:, 2])
     samples = Samples(cell, np.concatenate(numbers), table[:, 0], table[:, 3:5], table[:, 5:7])
     return _Smoothed(table[:, 1:3], samples, missing)
-
-
-def _inside(smoothed: _Smoothed, outline: Outline) -> Samples:
-    """Return the samples that lie in the tank."""
-    kept = (smoothed.samples.cell >= 0) & (outline.depth(*smoothed.position.T) >= 0.0)
-    return smoothed.samples.select(kept)
 
 
 def _nothing_measured(smoothed: _Smoothed, inside: Samples, min_count: int, window: float) -> str:

@@ -12,19 +12,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.files.atomic import atomic_path, require_target, write_atomic
 from driftwalk.core.text_files import text_of_name
-from driftwalk.flow.arena import Outline, outline_of
+from driftwalk.flow.arena import outline_of
 from driftwalk.flow.cell_means import fill_velocity
 from driftwalk.flow.grid import Grid, grid_rows
 from driftwalk.flow.readers import pivlab, text
 from driftwalk.flow.readers.columns import FIELD, column_of, holds_field, names_a_time
 from driftwalk.flow.readers.netcdf import holds_velocities, to_si
-from driftwalk.flow.readers.pivlab import holds_velocities as holds_pivlab, is_pivlab
 from driftwalk.flow.readers.programs import HEAD
 from driftwalk.flow.readers.text import Layout, TextOptions
 from driftwalk.flow.readers.units import FieldOptions, RawField, raw_to_si, y_words
@@ -123,7 +121,6 @@ def load_flow(
     options = FieldOptions(
         metres_per_pixel, frame_interval, length_unit, y_axis, origin, dict(variables or {})
     )
-    attrs: dict[str, Any] = {"source": text_of_name(source.name)}
     said = TextOptions(
         {quantity: str(name) for quantity, name in (columns or {}).items()},
         header_line,
@@ -131,23 +128,31 @@ def load_flow(
     )
     try:
         # PIVlab saves MATLAB files in HDF5, which looks like NetCDF.
-        if not is_netcdf(source) or is_pivlab(source):
-            return _from_rows(source, options, said, arena=arena, attrs=attrs)
-        if said != TextOptions():
-            raise InputError(_ONLY_TEXT.format("NetCDF"))
-        dataset = open_netcdf(source)
-        if find_kind(dataset) is FLOW_FIELD and "flag" in dataset:
-            if arena is not None and own_flags == "refuse":
-                raise InputError("it has its own flags: leave the arena out")
-            if options != FieldOptions():
-                raise InputError("the field is one of driftwalk's own: leave its units out")
-            return check_flow_field(check_contents(dataset, source))
-        si, notes = to_si(dataset, options)
-        time = si["time"].values if "time" in si.dims else None
-        velocity = np.stack([si["u"].values, si["v"].values], axis=-1)
-        x, y = si["x"].values, si["y"].values
-        turned = y_words(options, down=options.y_axis == "down")
-        attrs |= {"reading": f"NetCDF; {turned}", **_warning(notes)}
+        if not is_netcdf(source) or pivlab.is_pivlab(source):
+            if options.variables:
+                raise InputError(
+                    "`variables` name the variables of a NetCDF file, and this is not one: leave "
+                    "them out"
+                )
+            rows, notes, reading = raw_to_si(read_raw(source, said), options)
+            time, (x, y, velocity) = None, grid_rows(rows)
+        else:
+            if said != TextOptions():
+                raise InputError(_ONLY_TEXT.format("NetCDF"))
+            dataset = open_netcdf(source)
+            if find_kind(dataset) is FLOW_FIELD and "flag" in dataset:
+                if arena is not None and own_flags == "refuse":
+                    raise InputError("it has its own flags: leave the arena out")
+                if options != FieldOptions():
+                    raise InputError("the field is one of driftwalk's own: leave its units out")
+                return check_flow_field(check_contents(dataset, source))
+            si, notes = to_si(dataset, options)
+            time = si["time"].values if "time" in si.dims else None
+            velocity = np.stack([si["u"].values, si["v"].values], axis=-1)
+            x, y = si["x"].values, si["y"].values
+            reading = f"NetCDF; {y_words(options, down=options.y_axis == 'down')}"
+        attrs = {"source": text_of_name(source.name), "reading": reading}
+        attrs |= {"warning": "; ".join(notes)} if notes else {}
         return _new_field(x, y, velocity, time=time, arena=arena, attrs=attrs)
     except FormatError as error:
         path = error.path or source
@@ -156,37 +161,14 @@ def load_flow(
         raise FormatError(str(error), path=source) from error
 
 
-def _from_rows(
-    path: Path,
-    options: FieldOptions,
-    said: TextOptions,
-    *,
-    arena: Mapping[str, Any] | str | None,
-    attrs: dict[str, Any],
-) -> xr.Dataset:
-    """Return the field of a file that has a row for each node."""
-    if options.variables:
-        raise InputError(
-            "`variables` name the variables of a NetCDF file, and this is not one: leave them out"
-        )
-    si = raw_to_si(read_raw(path, said), options)
-    field = grid_rows(si.rows)
-    attrs = {**attrs, "reading": si.reading, **_warning(si.notes)}
-    return _new_field(field.x, field.y, field.velocity, arena=arena, attrs=attrs)
-
-
-def _warning(notes: list[str]) -> dict[str, str]:
-    return {"warning": "; ".join(notes)} if notes else {}
-
-
 def _new_field(
     x: Floats,
     y: Floats,
     velocity: Floats,
     *,
-    time: Floats | None = None,
+    time: Floats | None,
     arena: Mapping[str, Any] | str | None,
-    attrs: dict[str, Any],
+    attrs: Mapping[str, str],
 ) -> xr.Dataset:
     """Return the flow field of a file without flags, with its missing nodes filled."""
     described = None if arena is None else read_arena(arena)
@@ -211,11 +193,11 @@ def _new_field(
                 "centre of the tank is, which driftwalk flow FILE -o flow.nc takes"
             )
         flag[:, outside.reshape(grid.shape)] = FLAGS["outside"]
-    filled = np.stack([_fill(grid, *frame, outline) for frame in zip(frames, known, strict=True)])
+    pairs = zip(frames, known, strict=True)
+    filled = np.stack([fill_velocity(grid, one, known=at, outline=outline) for one, at in pairs])
     filled = filled.reshape(velocity.shape)
     facts = {"method": "file", "cell_size_m": grid.cell_size, **attrs}
-    if described is not None:
-        facts["arena"] = json.dumps(described)
+    facts |= {} if described is None else {"arena": json.dumps(described)}
     return build_flow_field(
         x,
         y,
@@ -225,12 +207,6 @@ def _new_field(
         flag=flag.reshape(velocity.shape[:-1]),
         attrs=facts,
     )
-
-
-def _fill(
-    grid: Grid, velocity: Floats, known: npt.NDArray[np.bool_], outline: Outline | None
-) -> Floats:
-    return velocity if known.all() else fill_velocity(grid, velocity, known=known, outline=outline)
 
 
 def read_raw(path: Path, said: TextOptions) -> RawField:
@@ -285,8 +261,8 @@ def flow_format(path: str | PathLike[str]) -> str | None:
         return None
     text.refuse_binary(source)
     try:
-        if is_pivlab(source):
-            return "pivlab" if holds_pivlab(source) else None
+        if pivlab.is_pivlab(source):
+            return "pivlab" if pivlab.holds_velocities(source) else None
         if is_netcdf(source):
             return _netcdf_format(source)
         return _text_format(source)
@@ -297,8 +273,7 @@ def flow_format(path: str | PathLike[str]) -> str | None:
 def _text_format(path: Path) -> str | None:
     """Return the program of a text whose names, or whose rows, are those of a field."""
     try:
-        head = text.read_text(path, most=HEAD)
-        layout = text.layout_of(head, TextOptions())
+        layout = text.layout_of(text.read_text(path, most=HEAD), TextOptions())
     except FormatError:
         # A damaged field is still one of its program.
         return None if path.stat().st_size == 0 else text.signed(path)
@@ -325,8 +300,7 @@ def _goes_along_a_line(layout: Layout) -> bool:
 
 
 def _netcdf_format(path: Path) -> str | None:
-    kind = kind_of_file(path)
-    if kind is not None:
+    if (kind := kind_of_file(path)) is not None:
         return "driftwalk" if kind == "flow_field" else None
     try:
         return "netcdf" if holds_velocities(open_netcdf(path)) else None
@@ -339,7 +313,7 @@ def _fills_a_grid(path: Path) -> bool:
     if path.stat().st_size > 64 << 20:
         return False
     try:
-        grid_rows(text.read(path).rows)
+        grid_rows(text.read(path, TextOptions()).rows)
     except InputError:
         return False
     return True

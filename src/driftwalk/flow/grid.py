@@ -169,9 +169,7 @@ def bilinear(
     [0.05, -0.01]
     """
     check_flow_field(flow)
-    at_x, at_y = np.broadcast_arrays(
-        np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    )
+    at_x, at_y = positions(x, y)
     if not (np.isfinite(at_x).all() and np.isfinite(at_y).all()):
         raise InputError("a point at which the flow is requested is not finite")
     column, right = _bracket(flow["x"].values, at_x)
@@ -182,6 +180,12 @@ def bilinear(
         for nodes in (_frame(flow, "u", time), _frame(flow, "v", time))
     )
     return u, v
+
+
+def positions(x: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Floats, Floats]:
+    """Return coordinates as arrays of one shape."""
+    at_x, at_y = np.broadcast_arrays(*(np.asarray(one, dtype=np.float64) for one in (x, y)))
+    return at_x, at_y
 
 
 def _bracket(nodes: Floats, at: Floats) -> tuple[Indices, Floats]:
@@ -275,20 +279,8 @@ class FieldRows:
     """Velocity along y, shape (n,)."""
 
 
-@dataclass(frozen=True)
-class GriddedField:
-    """A velocity field on a regular grid."""
-
-    x: Floats
-    """Nodes along x, shape (nx,)."""
-    y: Floats
-    """Nodes along y, shape (ny,)."""
-    velocity: Floats
-    """Velocities, shape (ny, nx, 2)."""
-
-
-def grid_rows(rows: FieldRows) -> GriddedField:
-    """Put the rows of a file on their grid.
+def grid_rows(rows: FieldRows) -> tuple[Floats, Floats, Floats]:
+    """Return the nodes along x and along y, and the velocities at them, shape (ny, nx, 2).
 
     Raises
     ------
@@ -298,19 +290,24 @@ def grid_rows(rows: FieldRows) -> GriddedField:
     x, column = _axis("x", rows.x, rows.line)
     y, row = _axis("y", rows.y, rows.line)
     node = row * x.size + column
-    _refuse_duplicates(node, rows)
-    order = np.argsort(node)
+    order = np.argsort(node, kind="stable")
+    again = np.flatnonzero(np.diff(node[order]) == 0)
+    if again.size:
+        first, second = order[again[0]], order[again[0] + 1]
+        raise FormatError(
+            f"the node x = {rows.x[second]:.6g}, y = {rows.y[second]:.6g} stands in line "
+            f"{rows.line[first]} already",
+            line=int(rows.line[second]),
+        )
     # No list of all nodes: scattered rows may span a grid of a billion of them.
-    absent = x.size * y.size - node.size
-    if absent:
+    if absent := x.size * y.size - node.size:
         moved = np.flatnonzero(node[order] != np.arange(node.size))
         j, i = divmod(int(moved[0]) if moved.size else node.size, x.size)
         raise FormatError(
             f"the grid of {x.size} x {y.size} nodes lacks {absent} of them, the first at "
             f"x = {x[i]:.6g}, y = {y[j]:.6g}: write a row for every node"
         )
-    velocity = np.column_stack([rows.u, rows.v])[order].reshape(y.size, x.size, 2)
-    return GriddedField(x, y, velocity)
+    return x, y, np.column_stack([rows.u, rows.v])[order].reshape(y.size, x.size, 2)
 
 
 def _axis(name: str, values: Floats, line: Indices) -> tuple[Floats, Indices]:
@@ -336,15 +333,3 @@ def _axis(name: str, values: Floats, line: Indices) -> tuple[Floats, Indices]:
             line=int(line[at]),
         )
     return round_nodes(even), number
-
-
-def _refuse_duplicates(node: Indices, rows: FieldRows) -> None:
-    order = np.argsort(node, kind="stable")
-    again = np.flatnonzero(np.diff(node[order]) == 0)
-    if again.size:
-        first, second = order[again[0]], order[again[0] + 1]
-        raise FormatError(
-            f"the node x = {rows.x[second]:.6g}, y = {rows.y[second]:.6g} stands in line "
-            f"{rows.line[first]} already",
-            line=int(rows.line[second]),
-        )

@@ -90,8 +90,7 @@ def random_tank_flow(
         raise InputError(f"the speed of a flow must be positive, got {speed}")
     described = read_arena(TANK_30_CM if arena is None else arena)
     outline = outline_of(described)
-    generator = np.random.default_rng(seed)
-    velocity = (_swirl if family == "swirl" else _eddies)(generator, outline)
+    velocity = (_swirl if family == "swirl" else _eddies)(np.random.default_rng(seed), outline)
     if speed is not None:
         velocity = _scaled(velocity, speed / _rms_speed(velocity, outline))
     parameters = {"seed": seed, "family": family, "speed": speed}

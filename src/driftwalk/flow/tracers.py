@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -105,14 +105,10 @@ def track_steps(trajectory: xr.Dataset) -> FoundSteps:
     if "ambiguous" in trajectory:
         unsure = (trajectory["ambiguous"].values.T > 0.0)[body, row]
         sure = ~(unsure[first] | unsure[first + 1])
-    steps = Steps(
-        body[first],
-        first,
-        0.5 * (time[first] + time[first + 1]),
-        interval,
-        0.5 * (position[first] + position[first + 1]),
-        (position[first + 1] - position[first]) / interval[:, None],
-    )
+    begin, end = position[first], position[first + 1]
+    moment, middle = 0.5 * (time[first] + time[first + 1]), 0.5 * (begin + end)
+    velocity = (end - begin) / interval[:, None]
+    steps = Steps(body[first], first, moment, interval, middle, velocity)
     return FoundSteps(
         steps.select(near & sure),
         across_gaps=int(np.count_nonzero(~near)),
@@ -270,11 +266,9 @@ def _medians(velocity: Floats, near: npt.NDArray[np.intp], other: Bools) -> tupl
     there = np.take_along_axis(other, first, axis=1)
     around = velocity[np.take_along_axis(near, first, axis=1)]
     around[~there] = np.nan
-    if there.all():
-        middle = np.median(around, axis=1)
-        return middle, np.median(_length(around - middle[:, None]), axis=1)
-    middle = np.nanmedian(around, axis=1)
-    return middle, np.nanmedian(_length(around - middle[:, None]), axis=1)
+    median: Callable[..., Any] = np.median if there.all() else np.nanmedian
+    middle = median(around, axis=1)
+    return middle, median(_length(around - middle[:, None]), axis=1)
 
 
 def _length(vectors: Floats) -> Floats:
@@ -374,7 +368,11 @@ def flow_from_tracers(
     grid = make_grid(_box(steps) if outline is None else outline, cells=cells, cell_size=cell_size)
     inside = steps if outline is None else steps.select(outline.depth(*steps.position.T) >= 0.0)
     if inside.time.size == 0:
-        raise InputError(_none_inside(steps))
+        low, high = steps.position.min(axis=0), steps.position.max(axis=0)
+        raise InputError(
+            f"no tracer is in the tank: the tracks cover x from {low[0]:.4g} to {high[0]:.4g} m, "
+            f"y from {low[1]:.4g} to {high[1]:.4g} m; check the scale, the origin and the arena"
+        )
     noise = _noise(trajectory, steps) if position_noise is None else position_noise
     # Beyond the wall there is no flow to agree with: such steps would count as neighbours of true
     # ones.
@@ -434,24 +432,9 @@ def _box(steps: Steps) -> Outline:
             "field to measure; are these the right columns?"
         )
     # A box without height has no area; its cells have the size that the other side gives them.
-    size = np.maximum(high - low, 1e-6 * (high - low).max())
-    center = (low + high) / 2.0
-    return outline_of(
-        {
-            "shape": "rectangle",
-            "width_m": float(size[0]),
-            "height_m": float(size[1]),
-            "center_m": center.tolist(),
-        }
-    )
-
-
-def _none_inside(steps: Steps) -> str:
-    low, high = steps.position.min(axis=0), steps.position.max(axis=0)
-    return (
-        f"no tracer is in the tank: the tracks cover x from {low[0]:.4g} to {high[0]:.4g} m, "
-        f"y from {low[1]:.4g} to {high[1]:.4g} m; check the scale, the origin and the arena"
-    )
+    width, height = np.maximum(high - low, 1e-6 * (high - low).max()).tolist()
+    box = {"shape": "rectangle", "width_m": width, "height_m": height}
+    return outline_of({**box, "center_m": ((low + high) / 2.0).tolist()})
 
 
 def _noise(trajectory: xr.Dataset, steps: Steps) -> float:
@@ -466,8 +449,7 @@ def _noise(trajectory: xr.Dataset, steps: Steps) -> float:
 def _average(steps: Steps, grid: Grid) -> CellMeans:
     """Return the mean velocity of each cell; a track is one visit, however often it returns."""
     cell = grid.cell_of(*steps.position.T)
-    still = np.zeros_like(steps.velocity)
-    samples = Samples(cell, steps.body, steps.time, steps.velocity, still)
+    samples = Samples(cell, steps.body, steps.time, steps.velocity, np.zeros_like(steps.velocity))
     return average_cells(samples, cells=grid.size, pause=math.inf, correction=np.zeros_like)
 
 

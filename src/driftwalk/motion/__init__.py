@@ -4,7 +4,9 @@ from driftwalk.motion.block import BlockModel
 from driftwalk.motion.camera import observe_worlds
 from driftwalk.motion.choose import feels_others, is_family_name, models, motion_model
 from driftwalk.motion.external_program.program import ProgramModel
-from driftwalk.motion.family import MEMBERS, PARTS, Member, Part, ParticleModel
+from driftwalk.motion.family.members import MEMBERS, Member
+from driftwalk.motion.family.particle import ParticleModel
+from driftwalk.motion.family.parts import PARTS, Part
 from driftwalk.motion.function import FunctionModel, Scene
 from driftwalk.motion.protocol import (
     Details,

@@ -248,8 +248,7 @@ def _member_and_parts(name: str) -> tuple[Member, tuple[Part, ...]]:
     if len(set(rest)) < len(rest):
         raise ConfigurationError(f"a part of {name} is named twice")
     member = MEMBERS[first]
-    unfit = [part for part in rest if member.kind == "inertial" and PARTS[part].parameters]
-    if unfit:
+    if unfit := [part for part in rest if member.kind == "inertial" and PARTS[part].parameters]:
         raise ConfigurationError(
             f"{first} has no heading: it takes the parts flow and reflect, not {', '.join(unfit)}"
         )

@@ -90,11 +90,10 @@ class FunctionModel:
         InputError
             When the function fails or returns something else than positions.
         """
-        # Some 100 MB of positions for each call.
-        most = max(4_000_000 // like.sample_time.size, 1)
         batches = world_batches(
             [values[one.name] for one in self.parameters],
-            most=most,
+            # Some 100 MB of positions for each call.
+            most=max(4_000_000 // like.sample_time.size, 1),
             one_setting=self.settings == "one",
         )
         parts = [self._call(values, like, keys, batch) for batch in batches]
@@ -114,10 +113,8 @@ class FunctionModel:
 
     def facts(self, estimate: Mapping[str, float]) -> dict[str, Any]:  # noqa: ARG002
         """Return which function it was: its name, and a hash of its source where there is one."""
-        described = self.describe()
-        source = described["source_sha256"]
-        hashed = {} if source is None else {"model_source_sha256": source}
-        return {"model": self.name, **hashed}
+        source = self.describe()["source_sha256"]
+        return {"model": self.name, **({} if source is None else {"model_source_sha256": source})}
 
     def _call(self, values: Values, like: Conditions, keys: Keys, batch: slice) -> Worlds:
         own = keys[batch]

@@ -7,9 +7,7 @@ import importlib.util
 import inspect
 import sys
 import traceback
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -22,22 +20,8 @@ from driftwalk.motion.ranges import Range
 from driftwalk.schema import Parameter
 
 
-@dataclass(frozen=True)
-class UserFile:
-    """A Python file that was loaded."""
-
-    path: Path
-    sha256: str
-    """Of the bytes that were run."""
-    module: ModuleType
-
-    def error_text(self, error: BaseException) -> str:
-        """Return an error in words, with the last line of the file that took part in it."""
-        return _error_text(self.path, error)
-
-
-def load_user_file(path: Path) -> UserFile:
-    """Run a Python file as a module.
+def load_user_file(path: Path) -> tuple[ModuleType, str]:
+    """Run a Python file as a module; return it, with the SHA-256 of the bytes that were run.
 
     Raises
     ------
@@ -55,15 +39,20 @@ def load_user_file(path: Path) -> UserFile:
     assert spec is not None, "a name that ends in .py has a loader"
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
+    # The file may import the ones next to it.
+    folder = str(full.parent)
+    sys.path.insert(0, folder)
     try:
-        with _on_the_path(str(full.parent)):
-            # The bytes that were hashed. The loader would take a compiled file for the same if the
-            # source was changed within the second and kept its size.
-            exec(compile(source, str(full), "exec", dont_inherit=True), module.__dict__)
+        # The bytes that were hashed. The loader would take a compiled file for the same if the
+        # source was changed within the second and kept its size.
+        exec(compile(source, str(full), "exec", dont_inherit=True), module.__dict__)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise ConfigurationError(_error_text(path, error)) from error
-    return UserFile(path, sha256, module)
+    finally:
+        if folder in sys.path:
+            sys.path.remove(folder)
+    return module, sha256
 
 
 def _read(path: Path) -> bytes:
@@ -78,30 +67,17 @@ def _read(path: Path) -> bytes:
         raise ConfigurationError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-@contextmanager
-def _on_the_path(folder: str) -> Iterator[None]:
-    """Let a file import the ones next to it."""
-    sys.path.insert(0, folder)
-    try:
-        yield
-    finally:
-        if folder in sys.path:
-            sys.path.remove(folder)
-
-
 def _error_text(path: Path, error: BaseException) -> str:
-    if isinstance(error, SyntaxError) and _same(error.filename, path):
+    """Return an error in words, with the last line of the file that took part in it."""
+    full = str(path.resolve())
+    if isinstance(error, SyntaxError) and error.filename == full:
         line = f", line {error.lineno}" if error.lineno else ""
         return f"{path}{line}: {error.msg}"
     frames = traceback.extract_tb(error.__traceback__)
-    lines = [frame.lineno for frame in frames if _same(frame.filename, path)]
+    lines = [frame.lineno for frame in frames if frame.filename == full]
     where = f"{path}, line {lines[-1]}" if lines else str(path)
     kind = "" if isinstance(error, DriftwalkError) else f"{type(error).__name__}: "
     return " ".join(f"{where}: {kind}{error}".split())
-
-
-def _same(filename: str | None, path: Path) -> bool:
-    return filename == str(path.resolve())
 
 
 SUFFIX: Final = ".py:"
@@ -147,12 +123,15 @@ def model_of_file(
     """
     before, _, name = address.rpartition(SUFFIX)
     path = Path(f"{before}.py")
-    file = load_user_file(path)
+    module, sha256 = load_user_file(path)
     where = f"{path}:{name}"
-    found = _named(file, name)
+    found = _named(module, path, name)
     is_class = inspect.isclass(found)
     if is_class:
-        found = _instance(found, file, name)
+        try:
+            found = found()
+        except Exception as error:
+            raise ConfigurationError(f"{name}() failed: {_error_text(path, error)}") from error
     if isinstance(found, MotionModel):
         if parameters or ranges or settings != "one":
             raise ConfigurationError(
@@ -173,7 +152,7 @@ def model_of_file(
             "arguments, or a function of a scene and parameters"
         )
     made_by = (f"{path.resolve()}:{name}", parameters, dict(ranges), settings)
-    return FileModel(model, file.sha256, made_by)
+    return FileModel(model, sha256, made_by)
 
 
 def _reloaded(sha256: str, address: str, *made_by: Any) -> FileModel:
@@ -183,39 +162,27 @@ def _reloaded(sha256: str, address: str, *made_by: Any) -> FileModel:
     return found
 
 
-def _named(file: UserFile, name: str) -> Any:
-    there = _defined_in(file)
+def _named(module: ModuleType, path: Path, name: str) -> Any:
+    there = _defined_in(module)
     known = f"it has {', '.join(there)}" if there else "it defines no function and no class"
     if not name:
-        raise ConfigurationError(
-            f"say what in {file.path} is the model ({file.path}:NAME): {known}"
-        )
-    try:
-        return getattr(file.module, name)
-    except AttributeError:
-        raise ConfigurationError(
-            f"{file.path} has no {name!r}, {known}{did_you_mean(name, there)}"
-        ) from None
+        raise ConfigurationError(f"say what in {path} is the model ({path}:NAME): {known}")
+    if not hasattr(module, name):
+        raise ConfigurationError(f"{path} has no {name!r}, {known}{did_you_mean(name, there)}")
+    return getattr(module, name)
 
 
-def _defined_in(file: UserFile) -> list[str]:
+def _defined_in(module: ModuleType) -> list[str]:
     """Return the names of the functions, classes and models that a file makes itself."""
     return [
         name
-        for name, value in vars(file.module).items()
+        for name, value in vars(module).items()
         if not name.startswith("_")
         and (
-            getattr(value, "__module__", None) == file.module.__name__
+            getattr(value, "__module__", None) == module.__name__
             or (isinstance(value, MotionModel) and not inspect.isclass(value))
         )
     ]
-
-
-def _instance(found: type, file: UserFile, name: str) -> Any:
-    try:
-        return found()
-    except Exception as error:
-        raise ConfigurationError(f"{name}() failed: {file.error_text(error)}") from error
 
 
 def _require_parameters(model: MotionModel, where: str) -> None:

@@ -120,8 +120,7 @@ def step_densities(reference: StepReference, table: StepTable) -> Singles:
     around = (table.angle / reference.angle_limit + 1.0) * 0.5 * BINS
     row, column = (np.clip(place, 0.0, BINS - 1.0).astype(np.int64) for place in (across, around))
     for world, count in enumerate(table.pairs):
-        cell = row[world, :count] * BINS + column[world, :count]
-        counts = np.bincount(cell, minlength=BINS**2)
+        counts = np.bincount(row[world, :count] * BINS + column[world, :count], minlength=BINS**2)
         density[world] = counts.reshape(BINS, BINS) / np.float32(max(count, 1))
     return density
 

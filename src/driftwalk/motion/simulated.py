@@ -11,13 +11,12 @@ import numpy.typing as npt
 
 from driftwalk.conditions.camera import study_as_seen
 from driftwalk.conditions.recorded import Conditions, neighbours_of, recorded_conditions
-from driftwalk.core.arrays import Floats, Keys
+from driftwalk.core.arrays import Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.external_program.program import ProgramModel
-from driftwalk.motion.family import ParticleModel
-from driftwalk.motion.family.particle import time_step_of
+from driftwalk.motion.family.particle import ParticleModel, time_step_of
 from driftwalk.motion.protocol import MotionModel, Worlds, no_numbers
 from driftwalk.motion.values import known_values
 from driftwalk.schema import body_track
@@ -110,7 +109,23 @@ def simulate_motion(
         if body is not None:
             raise InputError("`body` names a body of the recording `like`, and none is given")
         times = default_times(study) if sample_time is None else np.asarray(sample_time, np.float64)
-        conditions = _conditions(model, study, times, start, flow, keys, threads)
+        check_sample_time(times)
+        if times[0] != 0.0:
+            raise InputError(f"`sample_time` begins at {times[0]:g} s: it has to begin at 0 s")
+        starts = None
+        if flow is not None:
+            flow = continued_flow(flow, study, duration=float(times[-1]))
+            starts = flow_starts(flow, study, keys, duration=float(times[-1]))
+        conditions = Conditions(
+            sample_time=times,
+            start=model_start(model, study, flow, keys, starts) if start is None else start,
+            camera=plain_camera(study),
+            tank=study.tank,
+            view=study.observation.field_of_view,
+            flow=flow,
+            threads=threads or default_threads(),
+            flow_start=starts,
+        )
     else:
         if sample_time is not None or start is not None:
             raise InputError("with `like`, the recording gives times and start")
@@ -118,11 +133,10 @@ def simulate_motion(
         # The study as the recording was seen: its tank, body and camera, so that both can be
         # compared.
         study = study_as_seen(study, like, track)
-        camera = plain_camera(study)
         conditions = recorded_conditions(
             track,
             study,
-            camera=camera,
+            camera=plain_camera(study),
             flow=flow,
             neighbours=neighbours_of(like, body, study.tank),
             threads=threads,
@@ -149,36 +163,6 @@ def _check_flow(model: MotionModel, flow: xr.Dataset | None) -> None:
         )
     if isinstance(model, ProgramModel):
         raise InputError("a program gets no flow of the water: leave it out (`flow`)")
-
-
-def _conditions(
-    model: MotionModel,
-    study: Study,
-    times: Floats,
-    start: Start | None,
-    flow: xr.Dataset | None,
-    keys: Keys,
-    threads: int | None,
-) -> Conditions:
-    """Return the conditions of a simulation that is like no recording."""
-    check_sample_time(times)
-    if times[0] != 0.0:
-        raise InputError(f"`sample_time` begins at {times[0]:g} s: it has to begin at 0 s")
-    starts = None
-    if flow is not None:
-        flow = continued_flow(flow, study, duration=float(times[-1]))
-        starts = flow_starts(flow, study, keys, duration=float(times[-1]))
-    begin = model_start(model, study, flow, keys, starts) if start is None else start
-    return Conditions(
-        sample_time=times,
-        start=begin,
-        camera=plain_camera(study),
-        tank=study.tank,
-        view=study.observation.field_of_view,
-        flow=flow,
-        threads=threads or default_threads(),
-        flow_start=starts,
-    )
 
 
 def model_start(

@@ -45,8 +45,7 @@ def known_values(model: MotionModel, given: Mapping[str, Any]) -> dict[str, floa
     for name in given:
         if name not in usual:
             raise ConfigurationError(_unknown_parameter_text(model, name))
-    missing = [_in_words(one) for one in model.parameters if one.name not in given]
-    if missing:
+    if missing := [_in_words(one) for one in model.parameters if one.name not in given]:
         raise ConfigurationError(
             f"the model {model.name} has no value for {', '.join(missing)}: give one for each "
             "(`parameters`)"
@@ -83,15 +82,14 @@ def estimated_values(found: xr.Dataset, model: MotionModel) -> dict[str, float]:
     if "estimate" not in found or "parameter" not in found["estimate"].dims:
         raise InputError(f"the {kind} has no estimate of parameters: give that of a calibration")
     estimate = found["estimate"]
-    if "model" in estimate.dims:
-        names = [str(name) for name in found["model"].values]
-    else:
-        names = [str(found.attrs.get("model", "block"))]
+    several = "model" in estimate.dims
+    stated = found["model"].values if several else [found.attrs.get("model", "block")]
+    names = [str(name) for name in stated]
     if model.name not in names:
         raise InputError(
             f"the {kind} is about {', '.join(names)}, and not about the model {model.name}"
         )
-    if "model" in estimate.dims:
+    if several:
         estimate = estimate.isel(model=names.index(model.name))
     values = zip(found["parameter"].values, np.asarray(estimate.values, np.float64), strict=True)
     return {str(name): float(value) for name, value in values if np.isfinite(value)}

@@ -145,9 +145,8 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
     if block_side is None:
         notes = [
             f"the fitted circle (radius {fit.radius:.4g} m) is the path of the body's centre, "
-            "which "
-            'never reaches the rim: the tank is larger; state it with `tank="circle:D"` if you '
-            "know it"
+            "which never reaches the rim: the tank is larger; state it with "
+            '`tank="circle:D"` if you know it'
         ]
     else:
         notes = [
@@ -213,8 +212,7 @@ def _polygon(path: Path) -> PlacedArena:
     names, delimiter, skip, has_header = read_header(path)
     if len(names) != 2 or (has_header and names != ["x_m", "y_m"]):
         raise FormatError("a polygon has two columns, x_m and y_m", line=1)
-    table = read_table(path, TableLayout(delimiter, ["x_m", "y_m"], skip, (0, 1)))
-    vertices = table.stack((0, 1))
+    vertices = read_table(path, TableLayout(delimiter, ["x_m", "y_m"], skip, (0, 1))).stack((0, 1))
     if (vertices[0] == vertices[-1]).all():
         vertices = vertices[:-1]
     if vertices.shape[0] < 3 or not np.isfinite(vertices).all():

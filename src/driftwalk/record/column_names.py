@@ -68,8 +68,7 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     unit, unknown = UNITS.get(inside, ""), "" if inside in UNITS else inside
     tokens = _join_quaternion(words_of(_JOINED.sub(r"\1_\2", text)))
     last = tokens[-1].lower() if len(tokens) > 1 else ""
-    stamp = _stamp(tokens, unit)
-    if stamp is not None:
+    if (stamp := _stamp(tokens, unit)) is not None:
         return stamp
     index, quantity, number = _quantity(tokens[:-1] if last in UNITS or last in NO_UNIT else tokens)
     units = ALLOWED[quantity] if quantity and not inside else None

@@ -328,8 +328,7 @@ def _count_impossible(
     diagonal = arena_diagonal([body.x for body in bodies], [body.y for body in bodies], arena)
     said = []
     for body in bodies:
-        steps = impossible_steps(body.clock, body.x, body.y, diagonal=diagonal)
-        if steps is not None:
+        if (steps := impossible_steps(body.clock, body.x, body.y, diagonal=diagonal)) is not None:
             counts[body.name].impossible_steps = steps.number
             said.append(impossible_warning(body.name, steps))
     return said

@@ -63,8 +63,7 @@ def choose_keypoints(places: Mapping[str, Iterable[str]], options: ReadOptions) 
     if position not in known:
         got = "" if position is None else f" (got '{position}')"
         raise InputError(f"name the body's keypoint with `keypoint`{got}: {listed(known)}")
-    unknown = [name for name in options.heading or () if name not in known]
-    if unknown:
+    if unknown := [name for name in options.heading or () if name not in known]:
         raise InputError(
             f"`heading`: there is no keypoint '{unknown[0]}'; there are {listed(known)}"
         )

@@ -134,11 +134,9 @@ def nearest_table(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
         As in `unknown_file`.
     """
     near = _near(contents_of(path, head), loaders)
+    share, name, lacks = next(iter(near), (0.0, "", ""))
     # With half the names of a format or fewer, a table is just a table.
-    if not near or near[0][0] <= 0.5:
-        return ""
-    _, name, lacks = near[0]
-    return f"; as {name} it {lacks}" if lacks else ""
+    return f"; as {name} it {lacks}" if share > 0.5 and lacks else ""
 
 
 def _near(contents: Contents, loaders: Mapping[str, Any]) -> list[tuple[float, str, str]]:
@@ -271,8 +269,7 @@ class ForeignLoader:
     """A loader of another package, whose errors name the package."""
 
     def __init__(self, loader: Any, package: str) -> None:
-        lacking = [name for name in _MEMBERS if not hasattr(loader, name)]
-        if lacking:
+        if lacking := [name for name in _MEMBERS if not hasattr(loader, name)]:
             raise TypeError(f"it has no {' and no '.join(lacking)}")
         self._loader = loader
         self.name = str(loader.name)
@@ -444,8 +441,7 @@ def origin_of(
         table = table_in_memory(data)
         stated = {name: getattr(options, name) for name in _OF_FILES}
         stated |= {"format": format, "replicate": replicate}
-        given = [name for name, value in stated.items() if value is not None]
-        if given:
+        if given := [name for name, value in stated.items() if value is not None]:
             raise InputError(f"{table.what}: `{given[0]}` is about a file: leave it out")
         name = table.what.removeprefix("the ")
         return Origin(table.what, name, "table", partial(recording_of, table))

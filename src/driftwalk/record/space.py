@@ -268,8 +268,7 @@ def read_in_space(
             position[(position == 0.0).all(axis=1)] = np.nan
         turns = table.stack(one.turns) if one.turns else None
         tracks.append(SpaceTrack(name, clock, position, turns, one.form, one.degrees))
-    flat = lay_flat(tracks, plane_of(up))
-    return replace(flat, clock_origin=table.clock_origin, **facts)
+    return replace(lay_flat(tracks, plane_of(up)), clock_origin=table.clock_origin, **facts)
 
 
 PARTS: Final = ("qx", "qy", "qz", "qw")

@@ -418,8 +418,7 @@ def _parse(block: bytes, layout: TableLayout, *, line: int, decimal: str) -> Any
     whole = fields[fields > 0]
     width = len(layout.names)
     if (whole != width).any():
-        widest = check_lines(block, layout, line=line, decimal=decimal)
-        width = max(width, widest)
+        width = max(width, check_lines(block, layout, line=line, decimal=decimal))
     used = sorted({*layout.numbers, *layout.texts, *layout.stamps})
     # The stubs of pandas cannot follow options in a dictionary.
     missing: Any = {at: list(NAMELESS if at in layout.texts else MISSING) for at in used}

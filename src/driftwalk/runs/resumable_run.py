@@ -190,7 +190,7 @@ def run_work(
     with RunDirectory(
         folder,
         specification={"kind": work.kind, **work.specification()},
-        on_existing="overwrite" if overwrite else "resume",
+        overwrite=overwrite,
     ) as directory:
         about = manifest(
             command=command,

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
@@ -32,23 +32,24 @@ class Lens(Section):
 
     section_name: ClassVar[str] = "lens"
 
-    focal_x_px: Annotated[float, Quantity("1", gt=0, le=1e6)] = Field(
-        description="Focal length along the columns, in pixels."
-    )
-    focal_y_px: Annotated[float, Quantity("1", gt=0, le=1e6)] = Field(
-        description="Focal length along the rows, in pixels."
-    )
-    centre_column_px: Annotated[float, Quantity("1", ge=-1e5, le=1e5)] = Field(
-        description="Column of the optical axis."
-    )
-    centre_row_px: Annotated[float, Quantity("1", ge=-1e5, le=1e5)] = Field(
-        description="Row of the optical axis."
-    )
-    k1: float = Field(default=0.0, description="Radial distortion, second order.")
-    k2: float = Field(default=0.0, description="Radial distortion, fourth order.")
-    k3: float = Field(default=0.0, description="Radial distortion, sixth order.")
-    p1: float = Field(default=0.0, description="Tangential distortion, first.")
-    p2: float = Field(default=0.0, description="Tangential distortion, second.")
+    focal_x_px: Annotated[float, Quantity("1", gt=0, le=1e6)]
+    """Focal length along the columns, in pixels."""
+    focal_y_px: Annotated[float, Quantity("1", gt=0, le=1e6)]
+    """Focal length along the rows, in pixels."""
+    centre_column_px: Annotated[float, Quantity("1", ge=-1e5, le=1e5)]
+    """Column of the optical axis."""
+    centre_row_px: Annotated[float, Quantity("1", ge=-1e5, le=1e5)]
+    """Row of the optical axis."""
+    k1: float = 0.0
+    """Radial distortion, second order."""
+    k2: float = 0.0
+    """Radial distortion, fourth order."""
+    k3: float = 0.0
+    """Radial distortion, sixth order."""
+    p1: float = 0.0
+    """Tangential distortion, first."""
+    p2: float = 0.0
+    """Tangential distortion, second."""
 
     def straighten(self, points: Floats) -> Floats:
         """Return where pixels, shape (n, 2), would lie without distortion."""
@@ -73,14 +74,13 @@ class Lens(Section):
         u, v = points[:, 0], points[:, 1]
         square = u * u + v * v
         radial = 1.0 + square * (self.k1 + square * (self.k2 + square * self.k3))
-        shift = np.stack(
+        return radial, np.stack(
             [
                 2.0 * self.p1 * u * v + self.p2 * (square + 2.0 * u * u),
                 self.p1 * (square + 2.0 * v * v) + 2.0 * self.p2 * u * v,
             ],
             axis=-1,
         )
-        return radial, shift
 
     def _normalised(self, points: Floats) -> Floats:
         return (points - self._centre()) / self._focal()
@@ -108,26 +108,20 @@ class Camera(Section):
     [[0.1, 0.0]]
     """
 
-    width_px: Annotated[int, Quantity("1", whole=True, ge=1)] = Field(
-        description="Width of the images."
-    )
-    height_px: Annotated[int, Quantity("1", whole=True, ge=1)] = Field(
-        description="Height of the images."
-    )
-    plane_found_by: str | None = Field(
-        default=None, description="Source of the plane of the water: board, rim or scale."
-    )
-    homography_px_to_m: Nine | None = Field(
-        default=None,
-        description="Straightened pixel (column, row, 1) to (x, y, 1) in m: 3 x 3, row by row.",
-    )
-    tank_diameter_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
-        default=None, description="Diameter of the tank whose rim was found."
-    )
-    reprojection_rms_px: Annotated[float | None, Quantity("1", ge=0)] = Field(
-        default=None, description="How well the calibration fits its boards."
-    )
-    lens: Lens | None = Field(default=None, description="Lens; none is a lens without distortion.")
+    width_px: Annotated[int, Quantity("1", whole=True, ge=1)]
+    """Width of the images."""
+    height_px: Annotated[int, Quantity("1", whole=True, ge=1)]
+    """Height of the images."""
+    plane_found_by: str | None = None
+    """Source of the plane of the water: board, rim or scale."""
+    homography_px_to_m: Nine | None = None
+    """Straightened pixel (column, row, 1) to (x, y, 1) in m: 3 x 3, row by row."""
+    tank_diameter_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = None
+    """Diameter of the tank whose rim was found."""
+    reprojection_rms_px: Annotated[float | None, Quantity("1", ge=0)] = None
+    """How well the calibration fits its boards."""
+    lens: Lens | None = None
+    """Lens; none is a lens without distortion."""
 
     @model_validator(mode="after")
     def _invertible(self) -> Self:
@@ -162,16 +156,13 @@ class Camera(Section):
         """
         if not (math.isfinite(px_per_m) and px_per_m > 0):
             raise InputError(f"a scale must be above zero pixels per metre, got {px_per_m}")
-        column, row = (
-            centre_px if centre_px is not None else ((width_px - 1) / 2, (height_px - 1) / 2)
-        )
+        column, row = centre_px or ((width_px - 1) / 2, (height_px - 1) / 2)
         s = 1.0 / px_per_m
-        nine = (s, 0.0, -column * s, 0.0, -s, row * s, 0.0, 0.0, 1.0)
         return cls(
             width_px=width_px,
             height_px=height_px,
             plane_found_by="scale",
-            homography_px_to_m=nine,
+            homography_px_to_m=(s, 0.0, -column * s, 0.0, -s, row * s, 0.0, 0.0, 1.0),
             lens=lens,
         )
 
@@ -218,8 +209,7 @@ class Camera(Section):
 
 def project(matrix: Floats, points: Floats) -> Floats:
     """Return points, shape (n, 2), after a 3 x 3 projective map."""
-    with_one = np.column_stack([points, np.ones(len(points))])
-    mapped = with_one @ matrix.T
+    mapped = np.column_stack([points, np.ones(len(points))]) @ matrix.T
     return np.asarray(mapped[:, :2] / mapped[:, 2:])
 
 

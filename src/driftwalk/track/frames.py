@@ -14,7 +14,7 @@ import threading
 import time as clock
 from bisect import bisect_right, insort
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Protocol
 from urllib.parse import urlsplit, urlunsplit
@@ -144,6 +144,7 @@ class FrameGaps:
         self._counted_by = usual
 
 
+@dataclass
 class FrameFilter:
     """Leaves out frames that come twice or show nothing new, and checks the size.
 
@@ -161,49 +162,45 @@ class FrameFilter:
         counted where they are lost.
     """
 
-    def __init__(
-        self,
-        name: str,
-        counts: FrameCounts,
-        *,
-        keep_stale: bool = False,
-        gaps: FrameGaps | None = None,
-    ) -> None:
-        self._name, self._counts, self._keep_stale = name, counts, keep_stale
-        self._last: Image | None = None
-        self._time = -np.inf
-        self._gaps = gaps
+    name: str
+    counts: FrameCounts
+    keep_stale: bool = field(default=False, kw_only=True)
+    gaps: FrameGaps | None = field(default=None, kw_only=True)
+    _last: Image | None = field(default=None, init=False)
+    _time: float = field(default=-np.inf, init=False)
 
     def accept(self, index: int, time: float, image: Any) -> Frame | None:
         """Return the frame, None when it is left out."""
-        picture = _three_channels(image)
+        picture = np.asarray(image, dtype=np.uint8)
+        if picture.ndim != 3:
+            picture = np.repeat(picture[..., None], 3, axis=2)
         if self._last is not None and picture.shape != self._last.shape:
             was, now = self._last.shape, picture.shape
             raise FormatError(
                 f"frame {index} is {now[1]} x {now[0]} pixels, the frames before are "
                 f"{was[1]} x {was[0]}: a recording has one size",
-                path=self._name,
+                path=self.name,
             )
         if not time > self._time:
-            self._counts.duplicates += 1
+            self.counts.duplicates += 1
             return None
         stale = self._last is not None and _same(picture, self._last)
-        if self._last is not None and self._gaps is not None:
-            self._gaps.add(time - self._time)
-            self._counts.dropped = self._gaps.missing
+        if self._last is not None and self.gaps is not None:
+            self.gaps.add(time - self._time)
+            self.counts.dropped = self.gaps.missing
         self._last, self._time = picture, time
         if stale:
-            self._counts.stale += 1
-            if not self._keep_stale:
+            self.counts.stale += 1
+            if not self.keep_stale:
                 return None
-        self._counts.frames += 1
+        self.counts.frames += 1
         return Frame(index, time, picture)
 
     def settle(self) -> None:
         """Count the frames that are missing by all gaps, when no more will come."""
-        if self._gaps is not None:
-            self._gaps.settle()
-            self._counts.dropped = self._gaps.missing
+        if self.gaps is not None:
+            self.gaps.settle()
+            self.counts.dropped = self.gaps.missing
 
 
 class _Source:
@@ -261,10 +258,8 @@ class VideoFile(_Source):
             while self._capture.grab():
                 time = float(self._capture.get(self._position)) / 1000.0
                 read, image = self._capture.retrieve()
-                if read:
-                    frame = keep.accept(index, time, image)
-                    if frame is not None:
-                        yield frame
+                if read and (frame := keep.accept(index, time, image)) is not None:
+                    yield frame
                 index += 1
         finally:
             keep.settle()
@@ -328,9 +323,7 @@ class ImageSequence(_Source):
         keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale, gaps=FrameGaps())
         try:
             for index, (file, time) in enumerate(self._files):
-                image = read_image(file)
-                frame = keep.accept(index, time, image)
-                if frame is not None:
+                if (frame := keep.accept(index, time, read_image(file))) is not None:
                     yield frame
         finally:
             keep.settle()
@@ -382,7 +375,7 @@ class LiveCamera(_Source):
         self._capture, self._patience, self._now = capture, patience, now
         self._changed = threading.Condition()
         self._newest: tuple[int, float, Any] | None = None
-        self._taken = self._read = 0
+        self._read = 0
         self._gone = self._stop = False
         self._thread = threading.Thread(target=self._reading, name=f"reads {name}", daemon=True)
 
@@ -413,8 +406,7 @@ class LiveCamera(_Source):
             while (newest := self._next()) is not None:
                 index, time, image = newest
                 first = time if first is None else first
-                frame = keep.accept(index, time - first, image)
-                if frame is not None:
+                if (frame := keep.accept(index, time - first, image)) is not None:
                     self.waited_s = self._now() - time
                     yield frame
         finally:
@@ -436,15 +428,14 @@ class LiveCamera(_Source):
             read, image = self._capture.read()
             time = self._now()
             with self._changed:
+                self._changed.notify()
                 if not read:
                     self._gone = True
-                    self._changed.notify()
                     return
                 if self._newest is not None:
                     self.counts.dropped += 1
                 self._newest = (self._read, time, image)
                 self._read += 1
-                self._changed.notify()
 
     def _next(self) -> tuple[int, float, Any] | None:
         """Return the newest frame, waiting for it; None when the camera is gone."""
@@ -533,11 +524,6 @@ def _listed_images(folder: Path) -> list[tuple[Path, float]]:
                 f"has a time of {time:g} s, which no clock shows", path=path, line=number
             )
     return found
-
-
-def _three_channels(image: Any) -> Image:
-    picture = np.asarray(image, dtype=np.uint8)
-    return picture if picture.ndim == 3 else np.repeat(picture[..., None], 3, axis=2)
 
 
 def _same(first: Image, second: Image) -> bool:

@@ -89,9 +89,8 @@ class Board:
         """Return places on the board [m] and in the image [px] of the corners seen, or None."""
         cv2 = require_opencv("calibration of a camera")
         grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-        return (
-            self._chessboard(cv2, grey) if self.kind == "chessboard" else self._charuco(cv2, grey)
-        )
+        find = self._chessboard if self.kind == "chessboard" else self._charuco
+        return find(cv2, grey)
 
     def charuco_board(self, cv2: Any) -> Any:
         """Return OpenCV's object for a ChArUco board."""
@@ -130,8 +129,7 @@ def _refined(cv2: Any, grey: Any, corners: Any, share: float) -> Floats:
     """Return corners [px] once more, each from a window of a share of a square to each side."""
     pixels = np.asarray(corners, dtype=np.float32).reshape(-1, 2)
     apart = np.hypot(*(pixels[:, None] - pixels).transpose(2, 0, 1))
-    spacing = apart[apart > 0].min()
-    half = int(np.clip(share * spacing, 2, 15))
+    half = int(np.clip(share * apart[apart > 0].min(), 2, 15))
     stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-3)
     # It works in place.
     found = cv2.cornerSubPix(grey, pixels[:, None].copy(), (half, half), (-1, -1), stop)
@@ -208,16 +206,13 @@ def calibrate_lens(images: Sequence[Image], board: Board) -> LensCalibration:
         None,
         flags=cv2.CALIB_FIX_K3,
     )
-    k1, k2, p1, p2 = (float(value) for value in np.asarray(distortion).ravel()[:4])
+    bent = dict(zip(("k1", "k2", "p1", "p2"), np.ravel(distortion).tolist(), strict=False))
     lens = Lens(
         focal_x_px=float(matrix[0, 0]),
         focal_y_px=float(matrix[1, 1]),
         centre_column_px=float(matrix[0, 2]),
         centre_row_px=float(matrix[1, 2]),
-        k1=k1,
-        k2=k2,
-        p1=p1,
-        p2=p2,
+        **bent,
     )
     return LensCalibration(lens, float(rms), list(seen), sorted(found.keys() - seen.keys()))
 
@@ -294,6 +289,5 @@ def _advice(board: Board) -> str:
 
 def _is_right_handed(world: Floats, pixels: Floats) -> bool:
     """Return whether places and pixels turn the same way round."""
-    with_one = np.column_stack([world, np.ones(len(world))])
-    affine = np.linalg.lstsq(with_one, pixels, rcond=None)[0]
+    affine = np.linalg.lstsq(np.column_stack([world, np.ones(len(world))]), pixels, rcond=None)[0]
     return bool(np.linalg.det(affine[:2]) > 0.0)

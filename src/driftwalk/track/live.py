@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import reduce
 from operator import xor
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.extras import require_opencv
@@ -45,7 +45,7 @@ class _Message(NamedTuple):
     image: Image | None
 
 
-class LiveServer:
+class LiveServer(contextlib.AbstractContextManager["LiveServer"]):
     """Sends messages to every client that is connected.
 
     Parameters
@@ -91,10 +91,6 @@ class LiveServer:
         self._changed = threading.Condition()
         self._clients: list[_Client] = []
         threading.Thread(target=self._welcome, daemon=True).start()
-
-    def __enter__(self) -> Self:
-        """Return the server."""
-        return self
 
     def __exit__(self, *error: object) -> None:
         """Close the server."""
@@ -151,7 +147,7 @@ class LiveServer:
                 if len(self._clients) >= LIVE.most_clients:
                     connection.close()
                     continue
-                self._clients.append(_Client(connection, self._hello, self._encode, self._leave))
+                self._clients.append(_Client(connection, self))
                 self._changed.notify_all()
 
     def _leave(self, client: _Client) -> None:
@@ -164,15 +160,8 @@ class LiveServer:
 class _Client:
     """One connection: a thread that sends what waits, and one that reads requests."""
 
-    def __init__(
-        self,
-        connection: socket.socket,
-        hello: str,
-        encode: Callable[[Any], str] | None,
-        leave: Callable[[_Client], None],
-    ) -> None:
-        self._connection, self._encode, self._leave = connection, encode, leave
-        self._hello = hello
+    def __init__(self, connection: socket.socket, server: LiveServer) -> None:
+        self._connection, self._server = connection, server
         self._waiting: deque[_Message] = deque()
         self._changed = threading.Condition()
         self._lost = 0
@@ -206,7 +195,7 @@ class _Client:
 
     def _send(self) -> None:
         with contextlib.suppress(OSError):
-            self._connection.sendall(self._hello.encode("utf-8"))
+            self._connection.sendall(self._server._hello.encode("utf-8"))
             while (text := self._next()) is not None:
                 self._connection.sendall(text.encode("utf-8"))
         self._hang_up()
@@ -220,8 +209,8 @@ class _Client:
             width = self._width if message.image is not None else None
             if width is not None:
                 self._width = None
-        if self._encode is not None:
-            return self._encode(message.content)
+        if self._server._encode is not None:
+            return self._server._encode(message.content)
         extra: dict[str, Any] = {"frames_lost_by_client": lost}
         if width is not None and message.image is not None:
             extra["jpeg_base64"] = jpeg_text(message.image, width)
@@ -245,7 +234,7 @@ class _Client:
         with contextlib.suppress(OSError):
             self._connection.shutdown(socket.SHUT_RDWR)
         self._connection.close()
-        self._leave(self)
+        self._server._leave(self)
 
 
 def json_line(content: Mapping[str, Any]) -> str:

@@ -126,12 +126,9 @@ class PairState:
         self._take(_Look(sample, float(pair.time[0]), pair, kind))
 
     def _take(self, look: _Look) -> None:
-        if self.faces is None:
-            self._look_for_join(look)
-        else:
+        if self.faces is not None:
             self._look_for_parting(look)
-
-    def _look_for_join(self, look: _Look) -> None:
+            return
         if look.kind < 0 or (self._streak and self._streak[-1].kind != look.kind):
             self._streak = []
         if look.kind >= 0 and self._lasts(look):
@@ -315,8 +312,7 @@ class AssemblyObserver:
 
     def _seen_event(self, kind: str, event: Event) -> SeenEvent:
         one, other = (self.bodies[block] for block in event.blocks)
-        time = self._times[event.sample]
-        return SeenEvent(time, kind, (one, other), event.faces, event.outcome)
+        return SeenEvent(self._times[event.sample], kind, (one, other), event.faces, event.outcome)
 
     def _news(self) -> list[SeenEvent]:
         """Return the events that were not reported before, in order of time."""
@@ -326,8 +322,7 @@ class AssemblyObserver:
 
     def _possible(self, active: Sequence[Join], hidden: Sequence[int]) -> frozenset[str]:
         seen = [join for join in active if not set(join.blocks) & set(hidden)]
-        world = LatticeWorld(len(self.bodies), seen)
-        lattices = self._common_lattices(world, hidden)
+        lattices = self._common_lattices(LatticeWorld(len(self.bodies), seen), hidden)
         return possible_classes(lattices, len(hidden), chirality=self.chirality)
 
     def _common_lattices(self, world: LatticeWorld, hidden: Sequence[int]) -> list[Lattice]:
@@ -419,8 +414,7 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     outcome = found["outcome"].values
     classes = [str(name) for name in found["class"].values]
     # Beyond eight blocks `classify` lists what occurred; what is merely possible is added.
-    further = sorted(set().union(*sets) - set(classes))
-    if further:
+    if further := sorted(set().union(*sets) - set(classes)):
         classes += further
         # Of a class in which the world was not for certain, no rate is known.
         unseen = {"proportion": 0.0}
@@ -514,13 +508,11 @@ def _free_cells(
 
 
 def _shapes(
-    lattices: Sequence[Lattice], cells: Iterable[tuple[int, Cell]], chirality: Chirality
+    lattices: Sequence[Lattice], cells: frozenset[tuple[int, Cell]], chirality: Chirality
 ) -> Iterator[str]:
     """Give the shape of each assembly, hidden blocks at the cells given."""
-    hidden = set(cells)
     for place, lattice in enumerate(lattices):
-        own: dict[Cell, int] = {cell: -1 for at, cell in hidden if at == place}
-        left = {**lattice, **own}
+        left = {**lattice, **{cell: -1 for at, cell in cells if at == place}}
         while left:
             yield name_of(moved_to_origin(tuple(_connected(left))), chirality)
 
@@ -528,15 +520,11 @@ def _shapes(
 def _connected(left: Lattice) -> list[Cell]:
     """Take one connected assembly out of the cells that are left."""
     first = next(iter(left))
-    waiting, found = [(first, left.pop(first))], [first]
-    while waiting:
-        cell, assembly = waiting.pop()
-        for other in [cell for cell, label in left.items() if label == assembly >= 0]:
-            waiting.append((other, left.pop(other)))
-            found.append(other)
-        for other in neighbours((cell,)):
+    found = [(first, left.pop(first))]
+    for cell, assembly in found:  # it grows
+        beside = neighbours((cell,))
+        for other, label in list(left.items()):
             # Seen blocks of two assemblies side by side are not joined: that would have been seen.
-            if other in left and -1 in (assembly, left[other]):
-                waiting.append((other, left.pop(other)))
-                found.append(other)
-    return found
+            if label == assembly >= 0 or (other in beside and -1 in (assembly, label)):
+                found.append((other, left.pop(other)))
+    return [cell for cell, _ in found]

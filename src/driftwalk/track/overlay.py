@@ -70,8 +70,7 @@ def draw_states(image: Image, states: Iterable[TrackState], camera: PixelToWorld
         cv2.circle(picture, at, 4, colour, 1 if state.measured is None else -1, cv2.LINE_AA)
         if math.isfinite(state.theta):
             ahead = np.array([math.cos(state.theta), -math.sin(state.theta)])
-            tip = _whole(middle + 18 * ahead)
-            cv2.line(picture, at, tip, colour, 2, cv2.LINE_AA)
+            cv2.line(picture, at, _whole(middle + 18 * ahead), colour, 2, cv2.LINE_AA)
         if state.ambiguous > 0:
             cv2.circle(picture, at, 18, _WARNING, 2, cv2.LINE_AA)
         _write(picture, state.id, (at[0] + 6, at[1] - 6), _LIGHT, size=0.45)
@@ -258,8 +257,7 @@ def _arrow_end(found: Detection, radius: float, camera: PixelToWorld | None) -> 
         along = np.array([math.cos(found.theta), math.sin(found.theta)])
         direction = np.linalg.solve(camera.jacobian(pixel)[0], along)
         direction = direction / np.hypot(*direction)
-    end = np.array([found.column, found.row]) + 1.6 * radius * direction
-    return _whole(end)
+    return _whole(np.array([found.column, found.row]) + 1.6 * radius * direction)
 
 
 def _whole(point: Any) -> Pixel:

@@ -95,9 +95,8 @@ def find_rim(image: Image, lens: Lens | None = None) -> Rim:
     """
     cv2 = require_opencv()
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    start = _roughly(cv2, cv2.medianBlur(grey, 5), lens)
+    circle = _roughly(cv2, cv2.medianBlur(grey, 5), lens)
     smooth = cv2.GaussianBlur(grey, (0, 0), 1.0).astype(np.float32)
-    circle = np.array(start)
     found, rms = 0.0, math.inf
     around = _RIM.around
     for _ in range(_RIM.rounds):
@@ -150,13 +149,9 @@ def camera_from_rim(image: Image, *, diameter: float, lens: Lens | None = None) 
     if not (math.isfinite(diameter) and diameter > 0.0):
         raise InputError(f"a tank's diameter must be above zero metres, got {diameter}")
     rim = find_rim(image, lens)
-    camera = Camera.from_scale(
-        image.shape[1],
-        image.shape[0],
-        px_per_m=2.0 * rim.radius_px / diameter,
-        centre_px=(rim.column, rim.row),
-        lens=lens,
-    )
+    (rows, columns), scale = image.shape[:2], 2.0 * rim.radius_px / diameter
+    centre = (rim.column, rim.row)
+    camera = Camera.from_scale(columns, rows, px_per_m=scale, centre_px=centre, lens=lens)
     return camera.model_copy(update={"plane_found_by": "rim", "tank_diameter_m": diameter})
 
 
@@ -225,7 +220,7 @@ def _from_above(camera: Camera, columns: int, rows: int) -> Camera:
     return Camera.from_scale(columns, rows, px_per_m=px_per_m, centre_px=origin)
 
 
-def _roughly(cv2: Any, grey: Any, lens: Lens | None) -> tuple[float, float, float]:
+def _roughly(cv2: Any, grey: Any, lens: Lens | None) -> Floats:
     """Return column, row and radius of the strongest large circle, to a few pixels."""
     rows, columns = grey.shape
     factor = max(rows, columns) / _RIM.small_px
@@ -241,7 +236,7 @@ def _roughly(cv2: Any, grey: Any, lens: Lens | None) -> tuple[float, float, floa
             centre = np.array([[column, row]]) * factor + (factor - 1) / 2
             if lens is not None:
                 centre = lens.straighten(centre)
-            return float(centre[0, 0]), float(centre[0, 1]), radius * factor
+            return np.array([*centre[0], radius * factor])
     raise InputError(
         "no rim of the tank was found: no circle fills a third of the image's height; or calibrate "
         "with a board that lies on the plane of the water"

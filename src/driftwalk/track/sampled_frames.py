@@ -53,10 +53,9 @@ def sample_images(
     # Of a camera every fifth frame: those in between show much the same.
     stride = 5 if str(source).startswith("camera:") else max(1, total // number)
     # Seeking is quicker than reading 50 frames between two samples.
-    if total > 50 * number and Path(source).is_file():
-        found = _by_seeking(source, total, number)
-        if found:
-            return found
+    seekable = total > 50 * number and Path(source).is_file()
+    if seekable and (found := _by_seeking(source, total, number)):
+        return found
     opened = open_source(source, rate=rate)
     with contextlib.closing(opened):
         images = [frame.image for frame in islice(iter(opened), 0, stride * number, stride)]

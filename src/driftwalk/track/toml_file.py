@@ -8,7 +8,7 @@ from typing import TypeVar
 from driftwalk.core.errors import ConfigurationError, FormatError
 from driftwalk.core.files.atomic import atomic_path
 from driftwalk.core.text_files import read_toml
-from driftwalk.model.section import Section, toml_text
+from driftwalk.model.section import Section, description_of, toml_text
 
 Kind = TypeVar("Kind", bound=Section)
 
@@ -44,15 +44,14 @@ def save_sections(path: str | Path, section: Section, *, head: str) -> Path:
 def to_toml(section: Section, *, head: str) -> str:
     """Return a section with its sections as commented TOML."""
     plain, nested = [f"# {line}" for line in head.splitlines()], []
-    for key, field in type(section).model_fields.items():
-        value = getattr(section, key)
+    for key in type(section).model_fields:
+        value, description = getattr(section, key), description_of(type(section), key)
         if value is None:
             continue
         if isinstance(value, Section):
-            text = to_toml(value, head=field.description or "")
             # The section's name stands under the comment that says what it is.
-            comment, _, keys = text.partition("\n")
+            comment, _, keys = to_toml(value, head=description).partition("\n")
             nested.append(f"{comment}\n[{key}]\n{keys.strip()}")
         else:
-            plain += ["", f"# {field.description}", f"{key} = {toml_text(value)}"]
+            plain += ["", f"# {description}", f"{key} = {toml_text(value)}"]
     return "\n\n".join(["\n".join(plain).strip(), *nested]) + "\n"

@@ -15,7 +15,6 @@ from driftwalk.conditions import Neighbours
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.random_streams import world_keys
 from driftwalk.motion.choose import family_model
-from driftwalk.motion.family import MEMBERS, PARTS
 from driftwalk.motion.family.columns import (
     INERTIAL,
     SHARED,
@@ -24,7 +23,9 @@ from driftwalk.motion.family.columns import (
     dwell_law,
     switching_table,
 )
+from driftwalk.motion.family.members import MEMBERS
 from driftwalk.motion.family.particle import time_step_of
+from driftwalk.motion.family.parts import PARTS
 from driftwalk.schema import Parameter, Track
 from driftwalk.testing import MotionModelContract
 

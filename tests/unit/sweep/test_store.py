@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from driftwalk.core.errors import InputError, RunDirectoryError
-from driftwalk.core.files.shards import pack_shard, unpack_shard
+from driftwalk.core.files.shards import pack_shard, remove_shards, unpack_shard
 from driftwalk.sweep import MemoryStore, ShardStore, Store, collect, grid
 
 UNITS = grid(a=range(6)).units(2)
@@ -144,11 +144,11 @@ def test_folder_that_cannot_be_made(tmp_path: Path) -> None:
 def test_remove_takes_only_shards(store: ShardStore) -> None:
     store.write(UNITS[0], arrays_of(1))
     (store.folder / "notes.txt").write_text("mine")
-    store.remove()
+    remove_shards(store.folder)
     assert [path.name for path in store.folder.iterdir()] == ["notes.txt"]
     stranger = store.folder / "data.npz"
     stranger.write_bytes(b"no shard")
-    store.remove()
+    remove_shards(store.folder)
     assert stranger.exists()
 
 

@@ -11,6 +11,7 @@ from hypothesis import assume, given, settings, strategies as st
 
 from driftwalk.track.follow.assign import assign, connected_groups
 from driftwalk.track.follow.kalman import Motion, predict, start_state, update
+from driftwalk.track.follow.settings import TrackerSettings
 
 STILL = Motion(1e-30, 1e-30)
 
@@ -22,7 +23,9 @@ def test_fit_of_a_line_is_that_of_least_squares() -> None:
     x = 0.3 + 0.7 * time + 0.01 * random.normal(size=40)
     noise = np.diag([1e-4, 1e-4, 1e-4])[None]
     first = np.array([[x[0], 0.0, 0.0]])
-    mean, spread = start_state(first, noise, speed_std=1e3, turn_rate_std=1e3)
+    # Three standard deviations are as fast as a body can be.
+    wide = TrackerSettings(max_speed=3e3, max_turn_rate=3e3)
+    mean, spread = start_state(first, noise, wide)
     for step, value in zip(np.diff(time), x[1:], strict=True):
         mean, spread = predict(mean, spread, np.array([step]), STILL)
         mean, spread = update(mean, spread, np.array([[value, 0.0, 0.0]]), noise)

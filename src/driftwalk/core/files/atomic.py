@@ -82,7 +82,9 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         if target.exists() and not target.is_file():
             raise RunDirectoryError(f"cannot write {target}: it exists and is not a regular file")
         yield temporary
-        _flush(temporary)
+        # A full disk may show only here.
+        with temporary.open("r+b") as file:
+            os.fsync(file.fileno())
         rename(temporary, target)
         _flush_folder(target.parent)
     except BaseException as error:
@@ -132,9 +134,7 @@ def storage_error(error: BaseException, path: str | Path) -> RunDirectoryError |
     if isinstance(error, RunDirectoryError):
         return None
     number = _errno_of(error)
-    if number is None or not (number in _STORAGE or _is_about(error, Path(path))):
-        return None
-    if number not in _REASONS:
+    if number not in _REASONS or not (number in _STORAGE or _is_about(error, Path(path))):
         return None
     reason, remedy = _REASONS[number]
     if number not in _STORAGE:
@@ -182,12 +182,6 @@ def _errno_of(error: BaseException) -> int | None:
 def _is_about(error: BaseException, path: Path) -> bool:
     named = getattr(error, "filename", None)
     return named is None or Path(os.fsdecode(named)).parent in (path.parent, path)
-
-
-def _flush(path: Path) -> None:
-    """Put a file on the disk: a full disk may show only here."""
-    with path.open("r+b") as file:
-        os.fsync(file.fileno())
 
 
 def _flush_folder(folder: Path) -> None:

@@ -127,11 +127,9 @@ def faults_of(folder: Path, read: Iterable[str] = (), *, unread: bool = False) -
     names = dict.fromkeys([*read, *(listed if unread else ())])
     faults = [one for name in names if (one := _fault(folder, name, listed.get(name))) is not None]
     more = len(faults) - _MOST_FAULTS
-    return (
-        faults
-        if more < 2
-        else [*faults[:_MOST_FAULTS], f"{more} more files are missing or changed"]
-    )
+    if more < 2:
+        return faults
+    return [*faults[:_MOST_FAULTS], f"{more} more files are missing or changed"]
 
 
 def _fault(folder: Path, name: str, listed: Mapping[str, Any] | None) -> str | None:
@@ -162,8 +160,7 @@ def refuse_foreign(path: Path) -> None:
     """Refuse a folder with files of someone else's, before anything is put into it."""
     if state_of(path) != "new" or (path / MOVING_FILE).exists():
         return
-    foreign = visible(path)
-    if foreign:
+    if foreign := visible(path):
         raise RunDirectoryError(
             f"{path} holds files but no run of driftwalk ({foreign[0].name}, ...); choose an empty "
             "or a new directory"
@@ -222,18 +219,15 @@ def visible(path: Path) -> list[Path]:
 def visible_files(path: Path) -> Iterator[Path]:
     """Yield the files of a run, subfolders included, except its manifest."""
     for entry in visible(path):
-        if entry.name == MANIFEST_FILE:
-            continue
         if entry.is_dir():
             yield from sorted(file for file in entry.rglob("*") if file.is_file())
-        else:
+        elif entry.name != MANIFEST_FILE:
             yield entry
 
 
 def remove_leftovers(path: Path) -> None:
     """Remove the temporary files that a killed run left among its results, subfolders included."""
-    remove_partials(path)
-    for folder in (entry for entry in visible(path) if entry.is_dir()):
+    for folder in (path, *(entry for entry in visible(path) if entry.is_dir())):
         remove_partials(folder)
 
 

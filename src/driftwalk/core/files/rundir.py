@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Literal, Self, get_args
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from driftwalk.core.errors import InputError, RunDirectoryError
 from driftwalk.core.files.atomic import atomic_path, remove_partials, write_atomic
@@ -56,7 +56,6 @@ from driftwalk.core.provenance import (
 if TYPE_CHECKING:
     from filelock import BaseFileLock
 
-OnExisting = Literal["resume", "refuse", "overwrite"]
 _OVERWRITE: Final = f"`overwrite=True`, which moves what is there into {PREVIOUS_FOLDER}/"
 
 
@@ -70,12 +69,11 @@ class RunDirectory:
     specification : mapping
         Everything that determines the numbers: the resolved study, seeds, hashes of the inputs. The
         version of driftwalk is added. A run continues only under the same specification.
-    on_existing : {"resume", "refuse", "overwrite"}
-        Behaviour if the directory holds a run already. "resume" continues an unfinished run of the
-        same specification and refuses a finished one; "refuse" refuses both; "overwrite" moves a
-        finished run, or an unfinished one of another specification, into ``previous/<UTC time>/``.
-        It continues an unfinished run of the same specification, so that a killed command can be
-        repeated as it stands. Nothing is deleted.
+    overwrite : bool
+        Behaviour if the directory holds a run already. An unfinished run of the same specification
+        is continued in either case, so that a killed command can be repeated as it stands. A
+        finished run, or an unfinished one of another specification, is refused, or moved into
+        ``previous/<UTC time>/``. Nothing is deleted.
 
     Attributes
     ----------
@@ -103,22 +101,15 @@ class RunDirectory:
     """
 
     def __init__(
-        self,
-        path: str | Path,
-        *,
-        specification: Mapping[str, Any],
-        on_existing: OnExisting = "resume",
+        self, path: str | Path, *, specification: Mapping[str, Any], overwrite: bool = False
     ) -> None:
         from driftwalk import __version__
 
-        if on_existing not in get_args(OnExisting):
-            expected = ", ".join(get_args(OnExisting))
-            raise InputError(f"on_existing: expected one of {expected}, got {on_existing!r}")
         self.path = Path(path)
         self.specification = plain({"driftwalk_version": __version__, **specification})
         self.state: State = "new"
         self.moved_to: Path | None = None
-        self._on_existing = on_existing
+        self._overwrite = overwrite
         self._started = utc_now()
         self._lock: BaseFileLock | None = None
 
@@ -226,23 +217,15 @@ class RunDirectory:
 
     def _must_move(self, state: State) -> bool:
         """Return whether what is there has to be moved away; raise when it must not be."""
-        if state == "new":
-            return False
-        if state == "finished":
-            if self._on_existing != "overwrite":
-                raise RunDirectoryError(
-                    f"{self.path} holds a finished run; choose another directory or {_OVERWRITE}"
-                )
-            return True
-        stored = read_specification(self.path / RECORD_FILE)
-        same = stored["fingerprint"] == fingerprint_of(self.specification)
-        if self._on_existing == "overwrite":
-            return not same
-        if self._on_existing == "refuse":
+        if state == "finished" and not self._overwrite:
             raise RunDirectoryError(
-                f"{self.path} holds an unfinished run; continue it, choose another directory "
-                f"or {_OVERWRITE}"
+                f"{self.path} holds a finished run; choose another directory or {_OVERWRITE}"
             )
+        if state != "unfinished":
+            return state == "finished"
+        stored = read_specification(self.path / RECORD_FILE)
+        if self._overwrite:
+            return bool(stored["fingerprint"] != fingerprint_of(self.specification))
         refuse_other_specification(
             stored,
             self.specification,

@@ -120,11 +120,6 @@ class ShardStore:
             )
         return arrays
 
-    def remove(self) -> None:
-        """Remove the shards, and the folder if nothing else is in it."""
-        self._whole.clear()
-        remove_shards(self.folder)
-
     def _load(self, unit: Unit) -> Arrays | None:
         try:
             content = self._path(unit).read_bytes()

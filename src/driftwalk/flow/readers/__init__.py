@@ -1,3 +1,1 @@
 """Readers of flow-field files: one file per layout."""
-
-__all__: list[str] = []

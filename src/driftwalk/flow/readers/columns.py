@@ -36,7 +36,7 @@ _SYMBOLS: Final = {
     **dict.fromkeys(("v", "uy", "vy", "dy", "uy1", "vely"), "v"),
 }
 """From a name without its further words to the quantity."""
-_MARKS: Final[dict[str, Callable[[Floats], npt.NDArray[np.bool_]]]] = {
+MARKS: Final[dict[str, Callable[[Floats], npt.NDArray[np.bool_]]]] = {
     **dict.fromkeys(("flags", "mask", "status"), lambda mark: mark == 0.0),
     **dict.fromkeys(("chc",), lambda mark: mark > 0.0),
     **dict.fromkeys(("isvalid", "is valid", "valid"), lambda mark: mark != 0.0),
@@ -69,16 +69,6 @@ class Column(NamedTuple):
     base: str
     """The name without its unit, in small letters."""
 
-    @property
-    def exact(self) -> bool:
-        """Whether the name belongs to the quantity."""
-        return self.base == self.quantity
-
-    @property
-    def in_metres(self) -> bool:
-        """Whether the unit is one of length, and no pixels."""
-        return bool(self.unit) and not self.unit.lower().startswith(("px", "pix"))
-
 
 def column_of(name: str) -> Column:
     """Return what the name of a column says.
@@ -91,8 +81,7 @@ def column_of(name: str) -> Column:
     (('x', 'pix'), 'vector type')
     """
     text, unit = name.strip().strip('"').strip(), ""
-    suffix = _SUFFIX.fullmatch(text)
-    if suffix is not None:
+    if (suffix := _SUFFIX.fullmatch(text)) is not None:
         text, unit = suffix[1].lower(), suffix[2].lower()
         # A position over a time, or a velocity without one, is some other quantity.
         quantity = _quantity([text.replace("_", "")])
@@ -144,20 +133,19 @@ def choose_columns(names: Sequence[str], stated: Mapping[str, str]) -> dict[str,
         When a quantity has no column, or several.
     """
     known = [column_of(name) for name in names]
-    unknown = sorted(set(stated) - set(FIELD))
-    if unknown:
+    if unknown := sorted(set(stated) - set(FIELD)):
         raise InputError(f"`columns` of a flow field are of x, y, u, v; got '{unknown[0]}'")
     found = {}
     for wanted in FIELD:
         if wanted in stated:
             found[wanted] = _stated(stated[wanted], names, known)
             continue
-        ranks = [
-            (not one.in_metres, not one.exact, at)
+        # A column in metres rather than one in pixels, or without a unit.
+        ranks = sorted(
+            (not one.unit or one.unit.lower().startswith(("px", "pix")), one.base != wanted, at)
             for at, one in enumerate(known)
             if one.quantity == wanted
-        ]
-        ranks.sort()
+        )
         if not ranks or (len(ranks) > 1 and ranks[0][:2] == ranks[1][:2]):
             got = ", ".join(filter(None, names)) or f"{len(names)} columns without names"
             raise InputError(
@@ -188,12 +176,6 @@ def _stated(text: str, names: Sequence[str], known: Sequence[Column]) -> tuple[i
         f"`columns` names '{text}', and the table has "
         f"{', '.join(filter(None, names)) or f'the columns 1 to {len(names)}'}"
     )
-
-
-def marks_among(names: Sequence[str]) -> dict[int, Callable[[Floats], npt.NDArray[np.bool_]]]:
-    """Return the columns that say which velocities were measured."""
-    bases = [column_of(name).base for name in names]
-    return {at: _MARKS[base] for at, base in enumerate(bases) if base in _MARKS}
 
 
 def number(text: str, *, comma: bool) -> float | None:

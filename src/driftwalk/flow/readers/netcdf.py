@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.flow.grid import round_nodes
-from driftwalk.flow.readers.units import FieldOptions, FieldScale
+from driftwalk.flow.readers.units import FieldOptions, FieldScale, factor_to, words_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,17 +46,10 @@ _COUNTED: Final = ("frame", "frames", "", "1")
 """Units of a time that counts frames."""
 
 
-class SiField(NamedTuple):
-    """A field in SI on its grid."""
+def to_si(dataset: xr.Dataset, options: FieldOptions) -> tuple[xr.Dataset, list[str]]:
+    """Return the field of any NetCDF in SI, and sentences for the person who loads the file.
 
-    field: xr.Dataset
-    """u and v [m/s] over (y, x) or (time, y, x), x and y [m] rising."""
-    notes: list[str]
-    """Sentences for the person who loads the file."""
-
-
-def to_si(dataset: xr.Dataset, options: FieldOptions) -> SiField:
-    """Return the field of any NetCDF in SI.
+    It has u and v [m/s] over (y, x) or (time, y, x), and x and y [m] rising.
 
     Raises
     ------
@@ -96,9 +89,7 @@ def to_si(dataset: xr.Dataset, options: FieldOptions) -> SiField:
         for axis, shift in zip("xy", options.origin, strict=True):
             chosen[axis] = (axis, round_nodes(chosen[axis].values - shift))
     ordered = chosen.sortby([name for name in ("x", "y") if name in chosen.dims])
-    return SiField(
-        ordered.transpose(*[name for name in ("time", "y", "x") if name in ordered.dims]), notes
-    )
+    return ordered.transpose("time", "y", "x", missing_dims="ignore"), notes
 
 
 def holds_velocities(dataset: xr.Dataset) -> bool:
@@ -108,13 +99,11 @@ def holds_velocities(dataset: xr.Dataset) -> bool:
 
 def _named(dataset: xr.Dataset, options: FieldOptions) -> xr.Dataset:
     """Return the variables under the names u, v, x, y, and time and mask where there are any."""
-    unknown = sorted(set(options.variables) - set(QUANTITIES))
-    if unknown:
+    if unknown := sorted(set(options.variables) - set(QUANTITIES)):
         raise InputError(f"`variables` are of {', '.join(QUANTITIES)}; got '{unknown[0]}'")
     found = {}
     for quantity in QUANTITIES:
-        stated = options.variables.get(quantity)
-        name = stated or next(_candidates(dataset, quantity), None)
+        name = options.variables.get(quantity) or next(_candidates(dataset, quantity), None)
         if name is None and quantity in ("time", "mask"):
             continue
         if name is None or name not in dataset.variables:
@@ -133,8 +122,7 @@ def _named(dataset: xr.Dataset, options: FieldOptions) -> xr.Dataset:
         if name is not None and kept[name].ndim == 1 and kept[name].dims[0] != name:
             kept = _free(kept, name, found).swap_dims({kept[name].dims[0]: name})
     kept = kept.drop_vars([str(c) for c in kept.coords if c not in found.values()])
-    renamed = {name: quantity for quantity, name in found.items() if name != quantity}
-    return kept.rename(renamed)
+    return kept.rename({name: quantity for quantity, name in found.items() if name != quantity})
 
 
 def _straight(dataset: xr.Dataset, found: dict[str, str]) -> xr.Dataset:
@@ -205,7 +193,7 @@ def _with_times(chosen: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
         return mean, [f"the flow is the mean of {count} frames: the file holds no times"]
     try:
         # "seconds since ..." counts from a date that nothing here needs.
-        factor = FieldScale(FieldOptions()).time(unit.split(" since ")[0])
+        factor = factor_to(words_of_unit(unit.split(" since ")[0]), "s")
     except InputError as error:
         raise FormatError(f"the units of 'time' are '{unit}': {error}") from error
     return chosen.assign_coords(time=factor * chosen["time"].values.astype(np.float64)), []

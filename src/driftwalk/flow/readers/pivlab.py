@@ -21,18 +21,10 @@ from driftwalk.schema.stores.netcdf import HDF5, declared_bytes, refuse_elsewher
 _ENDINGS: Final = ("_filtered", "_original", "")
 """Of what PIVlab saves of the velocities, the first that is there is read."""
 _NUMBERED: Final = re.compile(r"u_(\d+)")
+_FACTORS: Final = (("calxy",), ("calu", "caluv"), ("calv", "caluv"))
+"""Factors of positions, u and v to m and m/s; of several the first that is there counts."""
 _MOST_FRAMES: Final = 10_000
 """Frames that are read: a damaged file may claim any number. Chosen by hand."""
-
-
-class _Names(NamedTuple):
-    """Names of the arrays of one frame."""
-
-    x: str
-    y: str
-    u: str
-    v: str
-    kind: str
 
 
 class _File(NamedTuple):
@@ -47,9 +39,8 @@ def is_pivlab(path: Path) -> bool:
     """Return whether a file is one of MATLAB's."""
     with path.open("rb") as file:
         head = file.read(len(OLD))
-    return head.startswith((OLD, HDF5_BASED)) or (
-        path.suffix.lower() == ".mat" and head.startswith(HDF5)
-    )
+    named = path.suffix.lower() == ".mat"
+    return head.startswith((OLD, HDF5_BASED, *((HDF5,) if named else ())))
 
 
 def holds_velocities(path: Path) -> bool:
@@ -81,19 +72,16 @@ def read(path: Path) -> RawField:
     if not frames:
         has = ", ".join(file.names[:12])
         raise FormatError(f"has no velocities of PIVlab (x, y, u, v), only {has}")
-    if len(frames) > _MOST_FRAMES or any(f[:, :2].shape != frames[0][:, :2].shape for f in frames):
+    nodes = frames[0][:, :2]
+    if len(frames) > _MOST_FRAMES or not all(np.array_equal(f[:, :2], nodes) for f in frames):
         raise FormatError("the frames have different nodes: save one alone")
-    stack = np.stack(frames)
-    if (stack[:, :, :2] != stack[0, :, :2]).any():
-        raise FormatError("the frames have different nodes: save one alone")
-    values = np.column_stack([stack[0, :, :2], _mean(stack[:, :, 2:])]) * scale
+    values = np.column_stack([nodes, _mean(np.stack(frames)[:, :, 2:])]) * scale
     line = np.arange(1, len(values) + 1, dtype=np.intp)
     notes = []
     if len(frames) > 1:
         notes.append(f"the flow is the mean of {len(frames)} frames: the file holds no times")
     rows = masked_rows(line, values, np.zeros(len(values), dtype=bool))
-    reading = "PIVlab's .mat"
-    return RawField(rows, length, velocity, down=True, notes=notes, reading=reading)
+    return RawField(rows, length, velocity, down=True, notes=notes, reading="PIVlab's .mat")
 
 
 def _mean(velocity: Floats) -> Floats:
@@ -151,27 +139,28 @@ def _declared(file: Any) -> int:
     return sum(sizes)
 
 
-def _frames(file: _File) -> list[_Names]:
-    """Return the names of the arrays of each frame, or of all where they are cell arrays."""
+def _frames(file: _File) -> list[list[str]]:
+    """Return the names of the arrays of each frame, or of all where they are cell arrays.
+
+    They are x, y, u, v and the type of the vectors.
+    """
     numbers = sorted(int(match[1]) for name in file.names if (match := _NUMBERED.fullmatch(name)))
     if numbers:
-        return [
-            _Names(*(f"{what}_{number}" for what in ("x", "y", "u", "v", "typevector")))
-            for number in numbers
-        ]
+        kinds = ("x", "y", "u", "v", "typevector")
+        return [[f"{kind}_{number}" for kind in kinds] for number in numbers]
     for ending in _ENDINGS:
         if {f"u{ending}", f"v{ending}"} <= set(file.names):
-            return [_Names("x", "y", f"u{ending}", f"v{ending}", f"typevector{ending}")]
+            return [["x", "y", *(f"{kind}{ending}" for kind in ("u", "v", "typevector"))]]
     return []
 
 
-def _frame(file: _File, names: _Names) -> Iterator[Floats]:
+def _frame(file: _File, names: list[str]) -> Iterator[Floats]:
     """Yield x, y, u, v of every frame, shape (n, 4), NaN where a vector was not measured."""
-    lacking = [name for name in names[:4] if name not in file.names]
-    if lacking:
+    *needed, kind = names
+    if lacking := [name for name in needed if name not in file.names]:
         raise FormatError(f"has no variable '{lacking[0]}'")
-    columns = [file.read(name) for name in names[:4]]
-    kinds = file.read(names.kind) if names.kind in file.names else []
+    columns = [file.read(name) for name in needed]
+    kinds = file.read(kind) if kind in file.names else []
     if len({len(arrays) for arrays in columns}) != 1 or len(kinds) not in (0, len(columns[0])):
         raise FormatError("has different numbers of frames in x, y, u and v")
     for number, arrays in enumerate(zip(*columns, strict=True)):
@@ -197,21 +186,15 @@ def _units(file: _File) -> tuple[str, str, Floats]:
         text = _text(file.read("units"))
         length, velocity = ("m", "m/s") if "[m]" in text else ("px", "px/frame")
         return length, velocity, np.ones(4)
-    factors = [
-        _factor(file, ("calxy",)),
-        _factor(file, ("calu", "caluv")),
-        _factor(file, ("calv", "caluv")),
-    ]
-    if factors[0] == 1.0:
+    place, u, v = (_factor(file, names) for names in _FACTORS)
+    if place == 1.0:
         return "px", "px/frame", np.ones(4)
-    return "m", "m/s", np.array([factors[0], factors[0], factors[1], factors[2]])
+    return "m", "m/s", np.array([place, place, u, v])
 
 
 def _factor(file: _File, names: tuple[str, ...]) -> float:
-    for name in names:
-        if name in file.names:
-            return float(np.ravel(file.read(name)[0])[0])
-    return 1.0
+    name = next((one for one in names if one in file.names), None)
+    return 1.0 if name is None else float(np.ravel(file.read(name)[0])[0])
 
 
 def _text(arrays: list[Any]) -> str:

@@ -85,8 +85,7 @@ class Program:
                 )
             each = [units[0], units[1], units[2], units[2]]
             return [f"{name} [{unit}]" for name, unit in zip("xyuv", each, strict=True)]
-        match = _QUOTED.search(head)
-        if match is not None:
+        if (match := _QUOTED.search(head)) is not None:
             return re.findall(r'"([^"]*)"', match[1])
         match = _UNQUOTED.search(head)
         return re.split(r"[\s,]+", match[1].strip().strip(",")) if match is not None else []

@@ -17,10 +17,10 @@ from driftwalk.core.errors import FormatError, InputError
 from driftwalk.flow.grid import FieldRows
 from driftwalk.flow.readers.columns import (
     FIELD,
+    MARKS,
     choose_columns,
     column_of,
     holds_field,
-    marks_among,
     number,
 )
 from driftwalk.flow.readers.programs import HEAD, PLAIN, Program, program_of
@@ -108,7 +108,7 @@ def signed(path: Path) -> str | None:
     return None if found is PLAIN else found.name
 
 
-def read(path: Path, options: TextOptions | None = None) -> RawField:
+def read(path: Path, options: TextOptions) -> RawField:
     """Read the rows of a text of any program.
 
     Raises
@@ -116,7 +116,6 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
     FormatError
         When a column is missing or a row cannot be read, with line and column.
     """
-    options = options or TextOptions()
     text = read_text(path)
     layout = layout_of(text, options)
     program, names = layout.program, layout.names
@@ -147,27 +146,21 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
     length, velocity = places["x"][1], places["u"][1]
     if not (length or velocity):
         length, velocity = program.units_in(text)
-    unread = 0 if layout.header else names.count("")
-    if unread:
+    if not layout.header and (unread := names.count("")):
         notes.append(f"columns beyond x, y, u, v have no name and are not read: {unread}")
-    return RawField(
-        rows,
-        length,
-        velocity,
-        down=program.counts_down(rows.y),
-        frame_interval=program.interval_in(text),
-        notes=notes,
-        reading=_described(layout, places, list(marks)),
-    )
+    down, interval = program.counts_down(rows.y), program.interval_in(text)
+    reading = _described(layout, places, list(marks))
+    return RawField(rows, length, velocity, down, interval, notes, reading)
 
 
 def _marks(layout: Layout) -> dict[int, Callable[[Floats], npt.NDArray[np.bool_]]]:
     """Return the columns that mark missing velocities, without those of words."""
     first = dict(enumerate(layout.rows[0][1].split(layout.delimiter)))
+    bases = [column_of(name).base for name in layout.names]
     return {
-        at: rule
-        for at, rule in marks_among(layout.names).items()
-        if number(first.get(at, ""), comma=False) is not None
+        at: MARKS[base]
+        for at, base in enumerate(bases)
+        if base in MARKS and number(first.get(at, ""), comma=False) is not None
     }
 
 
@@ -214,8 +207,7 @@ def layout_of(text: str, options: TextOptions) -> Layout:
         if at is None:
             raise FormatError(f"line {options.header_line} holds no names of columns")
         return _under(lines, at, _delimiter(lines[at][1], options), program)
-    stated = program.names_in(text)
-    if stated:
+    if stated := program.names_in(text):
         return _after_text(lines, stated, program, options)
     for at, (_, line) in enumerate(lines[:_MOST_HEAD]):
         if row_delimiter(line) is not None:
@@ -224,20 +216,17 @@ def layout_of(text: str, options: TextOptions) -> Layout:
             names = _names(line, delimiter)
             if holds_field(names) or _are_there(options.columns, names):
                 above = any(not one.lstrip().startswith(("#", "sep=")) for _, one in lines[:at])
-                own = program
                 bare = above or line.lstrip().startswith("#") or not holds_field(names)
-                if program is PLAIN and bare:
-                    own = program.without_units()
+                own = program.without_units() if program is PLAIN and bare else program
                 return _under(lines, at, delimiter, own)
     return _without_names(lines, program, options)
 
 
 def _tried(options: TextOptions) -> tuple[str | None, ...]:
-    if options.delimiter is None:
+    stated = options.delimiter
+    if stated is None:
         return _DELIMITERS
-    return (
-        None if options.delimiter.isspace() and options.delimiter != "\t" else options.delimiter,
-    )
+    return (None if stated.isspace() and stated != "\t" else stated,)
 
 
 def _delimiter(line: str, options: TextOptions) -> str | None:
@@ -272,9 +261,8 @@ def _under(lines: Lines, at: int, delimiter: str | None, program: Program) -> La
     if delimiter is None and rest:
         # Blanks stand in names as well.
         width = len(rest[0][1].split())
-        names = (
-            [*names[:width], *[""] * (width - len(names))] if holds_field(names[:width]) else names
-        )
+        if holds_field(names[:width]):
+            names = [*names[:width], *[""] * (width - len(names))]
     return Layout(program, line, names, delimiter, rest)
 
 

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Final
 
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.units import parse_quantity
@@ -93,9 +93,7 @@ class FieldScale:
             When the unit is none of length, or a fact is missing.
         """
         known = words_of_unit(unit) or self._stated()
-        if known == "px":
-            return self._metres_per_pixel()
-        return _parse(known, "m")
+        return self._metres_per_pixel() if known == "px" else factor_to(known, "m")
 
     def velocity(self, unit: str) -> float:
         """Return the metres per second of a velocity in some unit, as `length` does."""
@@ -108,12 +106,8 @@ class FieldScale:
         if known.endswith("/frame"):
             return self.length(known.removesuffix("/frame")) / self._frame_interval()
         if known.startswith("px"):
-            return self._metres_per_pixel() * _parse(f"m{known.removeprefix('px')}", "m/s")
-        return _parse(known, "m/s")
-
-    def time(self, unit: str) -> float:
-        """Return the seconds per unit of a time."""
-        return _parse(words_of_unit(unit), "s")
+            return self._metres_per_pixel() * factor_to(f"m{known.removeprefix('px')}", "m/s")
+        return factor_to(known, "m/s")
 
     def in_pixels(self, unit: str) -> bool:
         """Return whether positions of a unit are in pixels."""
@@ -127,13 +121,8 @@ class FieldScale:
         InputError
             Names the first one.
         """
-        given = {
-            "metres_per_pixel": self._options.metres_per_pixel,
-            "frame_interval": self._options.frame_interval,
-            "length_unit": self._options.length_unit,
-        }
-        for name, value in given.items():
-            if value is not None and name not in self._used:
+        for name in ("metres_per_pixel", "frame_interval", "length_unit"):
+            if getattr(self._options, name) is not None and name not in self._used:
                 raise InputError(f"the file itself says what `{name}` would: leave it out")
 
     def _stated(self) -> str:
@@ -150,31 +139,29 @@ class FieldScale:
         )
 
     def _metres_per_pixel(self) -> float:
-        self._used.add("metres_per_pixel")
-        return _positive(self._options.metres_per_pixel, "metres_per_pixel", "are in pixels")
+        return self._given("metres_per_pixel", "positions are in pixels")
 
     def _frame_interval(self) -> float:
         if self._interval is not None:
             return self._interval
-        self._used.add("frame_interval")
-        return _positive(
-            self._options.frame_interval, "frame_interval", "are shifts between two images"
-        )
+        return self._given("frame_interval", "velocities are shifts between two images")
+
+    def _given(self, name: str, what: str) -> float:
+        """Return a number above zero among the user's facts; `what` says why it is needed."""
+        self._used.add(name)
+        value: float | None = getattr(self._options, name)
+        if value is None:
+            raise InputError(
+                f"the {what}: give `{name}`, which driftwalk flow FILE -o flow.nc takes to make a "
+                "field in metres"
+            )
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(f"`{name}` must be a number above zero, got {value}")
+        return value
 
 
-class SiRows(NamedTuple):
-    """The rows of a file in SI."""
-
-    rows: FieldRows
-    """[m] and [m/s], y up."""
-    notes: list[str]
-    """Sentences for the person who loads the file."""
-    reading: str
-    """Meaning of the columns, and direction of y, in a line."""
-
-
-def raw_to_si(raw: RawField, options: FieldOptions) -> SiRows:
-    """Return the rows in m and m/s with y up, and what to say about them.
+def raw_to_si(raw: RawField, options: FieldOptions) -> tuple[FieldRows, list[str], str]:
+    """Return the rows in m and m/s with y up, sentences about them, and how they were read.
 
     Raises
     ------
@@ -191,17 +178,12 @@ def raw_to_si(raw: RawField, options: FieldOptions) -> SiRows:
     down = found if options.y_axis is None else options.y_axis == "down"
     sign = -1.0 if down else 1.0
     x0, y0 = options.origin or (0.0, 0.0)
-    si = FieldRows(
-        rows.line,
-        length * rows.x - x0,
-        sign * length * rows.y - y0,
-        velocity * rows.u,
-        sign * velocity * rows.v,
-    )
+    x, y = length * rows.x - x0, sign * length * rows.y - y0
+    si = FieldRows(rows.line, x, y, velocity * rows.u, sign * velocity * rows.v)
     notes = [*raw.notes]
     if found and options.y_axis is None:
         notes.append("y counts downwards in the file: y and v are negated (`y_axis`)")
-    return SiRows(si, notes, f"{raw.reading}; {y_words(options, down=down)}")
+    return si, notes, f"{raw.reading}; {y_words(options, down=down)}"
 
 
 def y_words(options: FieldOptions, *, down: bool) -> str:
@@ -224,7 +206,14 @@ def words_of_unit(text: str) -> str:
     ).strip()
 
 
-def _parse(unit: str, wanted: str) -> float:
+def factor_to(unit: str, wanted: str) -> float:
+    """Return the factor from a unit, in the words of `words_of_unit`, to one in SI.
+
+    Raises
+    ------
+    InputError
+        When it is no such unit, or degrees.
+    """
     if _DEGREES.fullmatch(unit.split(" ")[0]):
         raise InputError(
             "the positions are degrees of longitude and latitude: project the field to metres "
@@ -232,20 +221,8 @@ def _parse(unit: str, wanted: str) -> float:
         )
     word = re.match(r"[A-Za-z]*", unit)
     if word is not None and word[0].lower() in _IMPERIAL:
-        return _IMPERIAL[word[0].lower()] * _parse(f"m{unit[word.end() :]}", wanted)
+        return _IMPERIAL[word[0].lower()] * factor_to(f"m{unit[word.end() :]}", wanted)
     try:
         return parse_quantity(f"1 {unit}", wanted)
     except ConfigurationError as error:
         raise InputError(str(error)) from error
-
-
-def _positive(value: float | None, argument: str, what: str) -> float:
-    if value is None:
-        subject = "positions" if argument == "metres_per_pixel" else "velocities"
-        raise InputError(
-            f"the {subject} {what}: give `{argument}`, which driftwalk flow FILE -o flow.nc takes "
-            "to make a field in metres"
-        )
-    if not (math.isfinite(value) and value > 0.0):
-        raise InputError(f"`{argument}` must be a number above zero, got {value}")
-    return value

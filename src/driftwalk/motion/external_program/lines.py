@@ -182,15 +182,11 @@ def _parameter(given: Any) -> Parameter:
         if not _is_number_or_null(value) or (value is not None and not 0.0 < value < math.inf):
             raise ConfigurationError(f"its parameter {name} has no {key} above 0: {value!r:.80}")
     scale: Any = given.get("scale") or "linear"
+    unit, meaning = str(given.get("unit") or "1"), str(given.get("meaning") or "")
+    low, high = float(given["low"]), float(given["high"])
+    step, refined = (float(given.get(key) or 0.0) for key in STEPS)
     return Parameter(
-        name,
-        str(given.get("unit") or "1"),
-        float(given["low"]),
-        float(given["high"]),
-        float(given.get("step") or 0.0),
-        scale=scale,
-        refined_step=float(given.get("refined_step") or 0.0),
-        meaning=str(given.get("meaning") or ""),
+        name, unit, low, high, step, scale=scale, refined_step=refined, meaning=meaning
     )
 
 

@@ -71,12 +71,10 @@ class Pipes:
     """The standard streams of a running program; a thread for each ends when the program does."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        assert process.stderr is not None
         self.errors = b""
         """The last bytes of its standard error."""
-        self._streams = (process.stdin, process.stdout, process.stderr)
+        pipes = (process.stdin, process.stdout, process.stderr)
+        self._streams = [one for one in pipes if one is not None]
         self._input, self._output, self._errors = (one.fileno() for one in self._streams)
         # Guards all that follows, and is told of every change.
         self._changed = Condition()

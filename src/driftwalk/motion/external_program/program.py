@@ -11,6 +11,7 @@ import weakref
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -36,7 +37,6 @@ from driftwalk.motion.external_program.process import (
     Program,
     ProgramEnded,
     ProgramFault,
-    Request,
     close_programs,
 )
 from driftwalk.motion.protocol import Values, Worlds, in_words, world_batches
@@ -101,6 +101,9 @@ SCRIPTS: Final = (".py", ".jl", ".r", ".m", ".js", ".lua", ".rb", ".sh")
 """Names of files that an interpreter runs, by which a program is called rather than by that."""
 
 
+T = TypeVar("T")
+
+
 class ProgramModel:
     """A motion model that is an external program; see `motion_model`.
 
@@ -148,7 +151,7 @@ class ProgramModel:
         # Taken now: these are the files of the copy that is started now.
         self.files_sha256 = _hashes(self.words)
         self._open()
-        usual = self._pool.use(lambda program: read_parameters(program.greeting), Event())
+        usual = self._use(lambda program: read_parameters(program.greeting), Event())
         for name in given or {}:
             if name not in usual:
                 raise ConfigurationError(
@@ -211,7 +214,11 @@ class ProgramModel:
         self._open()
 
     def _open(self) -> None:
-        self._pool = ProgramPool(self.command, self.words, self.folder, self.timeout)
+        # Copies that wait, each used by one thread at a time; they end with the model, and at the
+        # latest with this process. The ends of a deque are safe for several threads: `append` and
+        # `pop` are one operation each.
+        self._idle: deque[Program] = deque()
+        weakref.finalize(self, close_programs, self._idle)
         self._flow_file = FlowFile()
         self._numbers = count(1)
         self._lock = Lock()
@@ -230,7 +237,7 @@ class ProgramModel:
                 program.repeats = True
             return self._ask(program, setting, like, own, stop)
 
-        return observe_worlds(*self._pool.use(positions, stop), like, own)
+        return observe_worlds(*self._use(positions, stop), like, own)
 
     def _ask(
         self,
@@ -242,7 +249,7 @@ class ProgramModel:
     ) -> Positions:
         flow = None if like.flow is None else self._flow_file.path_of(like.flow)
         request = world_request(next(self._numbers), setting, like, keys, flow=flow)
-        return read_positions(self._pool.ask(program, request, stop), request)
+        return read_positions(program.ask(request, timeout=self.timeout, stop=stop), request)
 
     def _require_repeats(self, program: Program, like: Conditions, stop: Event) -> None:
         """Let a copy make two short worlds, and the second one alone: as before, as other copies.
@@ -272,6 +279,54 @@ class ProgramModel:
                 "again; take all random numbers from a generator that starts with the seed of its "
                 "world",
             )
+
+    def _use(self, work: Callable[[Program], T], stop: Event) -> T:
+        """Return the result of some requests to one copy; if it dies, another one gets them.
+
+        Parameters
+        ----------
+        work : callable
+            Makes the requests.
+        stop : Event
+            Ends the requests when it is set.
+
+        Raises
+        ------
+        InputError
+            When a request fails, or two copies died.
+        """
+        try:
+            try:
+                return self._use_one(work, stop)
+            except ProgramEnded:
+                return self._use_one(work, stop)
+        except ProgramFault as fault:
+            twice = ", twice" if isinstance(fault, ProgramEnded) else ""
+            raise InputError(
+                f"the program {self.command!r} failed {fault.where}{twice}: {fault.reason}"
+            ) from fault
+
+    def _use_one(self, work: Callable[[Program], T], stop: Event) -> T:
+        program = self._waiting() or Program(self.words, self.folder)
+        try:
+            if not program.greeting:
+                program.greeting = program.ask(PARAMETERS_REQUEST, timeout=self.timeout, stop=stop)
+            result = work(program)
+        except BaseException:
+            # What it would write next is unknown.
+            program.close()
+            raise
+        self._idle.append(program)
+        return result
+
+    def _waiting(self) -> Program | None:
+        with suppress(IndexError):
+            while True:
+                program = self._idle.pop()
+                # A copy of this process by fork shares the pipes of its parent's programs.
+                if program.is_own:
+                    return program
+        return None
 
 
 def program_words(command: str, *, separator: str = os.sep) -> tuple[str, ...]:
@@ -318,91 +373,7 @@ def _last(positions: Positions) -> Positions:
 
 
 def _same(one: Positions, other: Positions) -> bool:
-    if (one.theta is None) != (other.theta is None):
-        return False
-    pairs = zip(one, other, strict=True)
-    return all(a is None or b is None or np.array_equal(a, b, equal_nan=True) for a, b in pairs)
-
-
-T = TypeVar("T")
-
-
-class ProgramPool:
-    """Running copies of a program, each used by one thread at a time.
-
-    They end with the pool, and at the latest with this process.
-
-    Parameters
-    ----------
-    command : str
-        The command as the user wrote it, for messages.
-    words : tuple of str
-        The command.
-    folder : str
-        The folder that it runs in.
-    timeout : float
-        Longest time that an answer may take [s].
-    """
-
-    def __init__(self, command: str, words: tuple[str, ...], folder: str, timeout: float) -> None:
-        self.command = command
-        self.words = words
-        self.folder = folder
-        self.timeout = timeout
-        # Its ends are safe for several threads: `append` and `pop` are one operation each.
-        self._idle: deque[Program] = deque()
-        weakref.finalize(self, close_programs, self._idle)
-
-    def use(self, work: Callable[[Program], T], stop: Event) -> T:
-        """Return the result of some requests to one copy; if it dies, another one gets them.
-
-        Parameters
-        ----------
-        work : callable
-            Makes the requests.
-        stop : Event
-            Ends the requests when it is set.
-
-        Raises
-        ------
-        InputError
-            When a request fails, or two copies died.
-        """
-        try:
-            try:
-                return self._use(work, stop)
-            except ProgramEnded:
-                return self._use(work, stop)
-        except ProgramFault as fault:
-            twice = ", twice" if isinstance(fault, ProgramEnded) else ""
-            raise InputError(
-                f"the program {self.command!r} failed {fault.where}{twice}: {fault.reason}"
-            ) from fault
-
-    def ask(self, program: Program, request: Request, stop: Event) -> bytes:
-        """Return the answer of one copy to a request."""
-        return program.ask(request, timeout=self.timeout, stop=stop)
-
-    def _use(self, work: Callable[[Program], T], stop: Event) -> T:
-        program = self._waiting() or Program(self.words, self.folder)
-        try:
-            if not program.greeting:
-                program.greeting = self.ask(program, PARAMETERS_REQUEST, stop)
-            result = work(program)
-        except BaseException:
-            # What it would write next is unknown.
-            program.close()
-            raise
-        self._idle.append(program)
-        return result
-
-    def _waiting(self) -> Program | None:
-        while self._idle:
-            try:
-                program = self._idle.pop()
-            except IndexError:
-                return None
-            # A copy of this process by fork shares the pipes of its parent's programs.
-            if program.is_own:
-                return program
-        return None
+    return all(
+        a is b or (a is not None and b is not None and np.array_equal(a, b, equal_nan=True))
+        for a, b in zip(one, other, strict=True)
+    )

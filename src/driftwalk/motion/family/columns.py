@@ -140,8 +140,7 @@ def _as_single(columns: Sequence[Floats]) -> Floats:
 
     The last bits of a gamma function are not the same on all machines; those of a float are.
     """
-    rows = np.stack(columns, axis=1)
-    return np.ascontiguousarray(rows.astype(np.float32).astype(np.float64))
+    return np.ascontiguousarray(np.stack(columns, axis=1).astype(np.float32).astype(np.float64))
 
 
 def _column(value: npt.ArrayLike, worlds: int) -> Floats:

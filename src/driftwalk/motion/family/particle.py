@@ -180,19 +180,13 @@ class ParticleModel(NativeModel):
         where it does not move, in that of its recorded orientation, or a random one.
         """
         table = self.table(values, keys.size)
-        start, moment = like.start, 0.0 if like.flow_start is None else like.flow_start
-        u, v = (
-            velocity_at(like.flow, start.x, start.y, moment)
-            if self.needs_flow and like.flow is not None
-            else (0, 0)
-        )
-        vx, vy = np.asarray(start.vx, dtype=float) - u, np.asarray(start.vy, dtype=float) - v
-        heading = np.where(
-            np.hypot(vx, vy) > 0.0, np.arctan2(vy, vx), np.asarray(start.theta, dtype=float)
-        )
-        given = [np.asarray(one, dtype=float) for one in (start.x, start.y)]
-        rest = [vx, vy, np.asarray(start.omega, dtype=float)]
-        columns = np.broadcast_arrays(*given, world_orientations(heading, keys), *rest)
+        x, y, theta, vx, vy, omega = (np.asarray(one, dtype=float) for one in like.start)
+        if self.needs_flow and like.flow is not None:
+            moment = 0.0 if like.flow_start is None else like.flow_start
+            u, v = velocity_at(like.flow, x, y, moment)
+            vx, vy = vx - u, vy - v
+        heading = np.where(np.hypot(vx, vy) > 0.0, np.arctan2(vy, vx), theta)
+        columns = np.broadcast_arrays(x, y, world_orientations(heading, keys), vx, vy, omega)
         rows = np.ascontiguousarray(np.column_stack([*columns, table.columns]))
         return rows, self.particle(table, like)
 

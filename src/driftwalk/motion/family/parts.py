@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 from driftwalk.schema.parameters import Parameter, Scale
@@ -98,13 +98,8 @@ class Part:
 
 
 # A member has a parameter of the same name, the time of its slow bouts.
-_SLOW_TIME: Final = replace(
-    parameters("slow_time")[0],
-    low=0.5,
-    high=1000.0,
-    step=0.0,
-    refined_step=0.0,
-    meaning="Time over which that factor is remembered.",
+_SLOW_TIME: Final = next(
+    _declared("slow_time [s] 0.5 to 1000 log: Time over which that factor is remembered.")
 )
 
 PARTS: Final[Mapping[str, Part]] = {

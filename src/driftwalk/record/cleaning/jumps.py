@@ -213,8 +213,7 @@ def arena_diagonal(
     """
     stated = arena or {}
     if "vertices_m" in stated:
-        corners = np.asarray(stated["vertices_m"], dtype=np.float64)
-        tank = np.ptp(corners, axis=0).tolist()
+        tank = np.ptp(np.asarray(stated["vertices_m"], dtype=np.float64), axis=0).tolist()
     else:
         side = stated.get("diameter_m", 0.0)
         tank = [stated.get("width_m", side), stated.get("height_m", side)]

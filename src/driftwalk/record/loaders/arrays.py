@@ -109,8 +109,7 @@ def _of_array(path: Path, options: ReadOptions) -> RawRecording:
 
 def _of_arrays(variables: dict[str, Value], options: ReadOptions) -> RawRecording:
     """Return the recording of arrays by name, at the frame rate that the file holds."""
-    tables = matlab_tables(variables)
-    recording = recording_of(the_one_that_fits(tables, options, "array"), options)
+    recording = recording_of(the_one_that_fits(matlab_tables(variables), options, "array"), options)
     rates = [value for name, value in variables.items() if name.lower() in _RATES]
     if len(rates) == 1 and isinstance(rates[0], np.ndarray) and rates[0].size == 1:
         recording.frame_rate_hz = float(rates[0].ravel()[0])

@@ -72,8 +72,7 @@ class HeadedFormat:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
-        names = first_names(head)[: len(self.header)]
-        return 0.95 if tuple(names) == self.header else 0.0
+        return 0.95 if tuple(first_names(head)[: len(self.header)]) == self.header else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every body, in the format's own unit of length."""

@@ -81,8 +81,7 @@ def _of_arrays(
         }
         for of, individual in enumerate(names[1])
     }
-    copied = partial(np.array, dtype=np.float64)
-    return recording_of_poses(places, copied, clock, options, usual)
+    return recording_of_poses(places, partial(np.array, dtype=np.float64), clock, options, usual)
 
 
 def _in_order(values: xr.DataArray, *order: str) -> xr.DataArray:

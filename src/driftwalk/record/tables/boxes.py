@@ -105,8 +105,7 @@ def find_box(
         return replace(box, image=(int(match["w"]), int(match["h"]))) if match["w"] else box
     if source.matrices or ({"x", "y"} & set(chosen) and not {"x1", "w"} & set(chosen)):
         return None
-    quad = _quad(source)
-    if quad is not None:
+    if (quad := _quad(source)) is not None:
         return quad
     if set(_CORNERS) <= set(found):
         return _corners(source, sides, meanings)
@@ -164,8 +163,7 @@ def _stated(form: str, given: _Sides) -> Box:
     names = sides = _CORNERS if form == "xyxy" else ("x", "y", "w", "h")
     if form != "xyxy" and "x1" in found and "x" not in found:
         sides = ("x1", "y1", "w", "h")
-    missing = [side for side in sides if side not in found]
-    if missing:
+    if missing := [side for side in sides if side not in found]:
         wanted = argument_text("columns", dict.fromkeys(sides, "NAME"))
         raise InputError(f"a box of the form '{form}' has no column of {listed(missing)}: {wanted}")
     columns = {name: found[side] for name, side in zip(names, sides, strict=True)}
@@ -222,8 +220,7 @@ def _quad(source: TableSource) -> Box | None:
     joined = ["".join(words_of(name)).lower() for name in source.names]
     first = int({"corner4x", "corner4y"} <= set(joined))  # of p1 ... p4 each may be a body
     for at, word in enumerate(joined):
-        match = _OF_QUAD.fullmatch(word)
-        if match is not None:
+        if (match := _OF_QUAD.fullmatch(word)) is not None:
             found[f"{match[2]}{int(match[1]) + 1 - first}"] = at
         elif word in _QUAD:
             found[word], named = at, False

@@ -54,8 +54,7 @@ class _Reader(NamedColumns):
     def reading(self) -> TableReading:
         """Return the reading."""
         self.choose()
-        box = find_box(self.source, self.options, self.meanings, self.chosen)
-        if box is not None:
+        if (box := find_box(self.source, self.options, self.meanings, self.chosen)) is not None:
             words = ("bbox", "bb", "box")
             around = {at for at, one in self.meanings.items() if one.body.lower() in words}
             self.drop({*box.replaced} | (around - {*box.sides.values()}), box.why)
@@ -241,8 +240,7 @@ class _Reader(NamedColumns):
                 result.numbers = (time, part)
             first = next(iter(self._sampled(time)), "")
             # The stamp of a header of ROS counts whole nanoseconds since 1970.
-            of_ros = meaning.rank == 0 and first.isdecimal() and len(first) >= 18
-            if of_ros and not meaning.unit:
+            if meaning.rank == 0 and not meaning.unit and first.isdecimal() and len(first) >= 18:
                 result.clock_unit, result.bare_clock = "ns", False
                 self.meanings[time] = replace(meaning, unit="ns")
             return

@@ -87,8 +87,7 @@ def stamp_form(text: str) -> StampForm | None:
     >>> stamp_form("2024-05-01")
     StampForm(kind='moment', has_time=False)
     """
-    match = _match(text)
-    if match is not None:
+    if (match := _match(text)) is not None:
         return StampForm(_kind(match), match["hour"] is not None)
     return StampForm("") if _UNCLEAR.fullmatch(text) else None
 

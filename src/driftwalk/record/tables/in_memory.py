@@ -388,8 +388,7 @@ def _of_pandas(frame: Any) -> MemorySource:
             names.append(str(name))
             columns.append(index.to_series())
     zoned = frozenset(at for at, one in enumerate(columns) if getattr(one.dtype, "tz", None))
-    values = [_of_series(one) for one in columns]
-    return MemorySource("the DataFrame", names, values, zoned=zoned)
+    return MemorySource("the DataFrame", names, [_of_series(one) for one in columns], zoned=zoned)
 
 
 def _of_series(series: Any) -> Values:

@@ -135,8 +135,7 @@ def _hdf5_struct(contents: Hdf5Contents, group: Any) -> Value:
     for field in map(str, group):
         entry = group[field]
         kind = text_of(entry.attrs.get(_CLASS, b""))
-        references = isinstance(entry, h5py.Dataset) and entry.dtype.kind == "O"
-        if references and kind != "cell":
+        if isinstance(entry, h5py.Dataset) and entry.dtype.kind == "O" and kind != "cell":
             many[field] = _referred(contents, entry)
         else:
             one[field] = _hdf5_value(contents, str(entry.name))

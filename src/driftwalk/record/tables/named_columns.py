@@ -108,13 +108,12 @@ class NamedColumns:
 
     def choose(self) -> None:
         """Take the columns that the user names for what they are said to be."""
-        skipped = self.options.columns.get(_SKIP, "")
-        for name in filter(None, skipped.split("+")):
+        for name in filter(None, self.options.columns.get(_SKIP, "").split("+")):
             index, _ = self._find(name, _SKIP)
             self.drop([index], LEFT_OUT)
         for quantity, reference in self.chosen.items():
-            first, *more = self._references(reference, quantity)
-            for part, (index, unit) in zip((quantity, "t+"), (first, *more), strict=False):
+            places = self._references(reference, quantity)
+            for part, (index, unit) in zip((quantity, "t+"), places, strict=False):
                 if unit and unit not in ALLOWED[quantity]:
                     where = argument_text("columns", {quantity: reference})
                     raise InputError(f"{where}: '{unit}' is not a unit of {quantity}")
@@ -194,8 +193,7 @@ class NamedColumns:
         for body, why in left.items():
             self.drop([at for at, one in self.meanings.items() if one.body == body], why)
         self._doubt(set(bodies) - set(left))
-        named = [body for body in left if body in bodies]
-        if named:
+        if named := [body for body in left if body in bodies]:
             self.result.notes.append(
                 f"pairs of x and y that are not read as bodies: {listed(named)} (if one is the "
                 f"body, name it with {argument_text('columns', {'x': 'NAME', 'y': 'NAME'})})"

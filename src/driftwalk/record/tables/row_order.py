@@ -85,8 +85,7 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
                 f"no column is known to hold times or frames, but '{names[at]}' counts up and "
                 f"skips some: add {frame} if it counts frames, {time} if it holds times"
             )
-    apart = _tracks(table, counters, free, reading)
-    if apart is not None:
+    if (apart := _tracks(table, counters, free, reading)) is not None:
         body, counter = apart
         what, columns = f"'{names[counter]}' counts frames", {"frame": names[counter]}
         if body is not None and body != reading.body_column:

@@ -61,8 +61,7 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
     reading = columns_of(source, options)
     labels = [column.name for column in reading.columns]
     if reading.clock is None:
-        found = other_order(source, reading, labels)
-        if found is not None:
+        if (found := other_order(source, reading, labels)) is not None:
             raise source.error(found)
         if options.frame_rate_hz is None:
             scale = scale_wanted(reading.length_unit, bare_is_si=False, options=options)
@@ -153,18 +152,15 @@ def columns_of(source: TableSource, options: ReadOptions) -> TableReading:
 def _detector_advice(source: TableSource) -> str:
     """Return how to name the columns of rows without a header that are those of a detector."""
     try:
-        rows = np.array([[float(one) for one in row] for row in source.sample()])
+        rows = np.atleast_2d([[float(one) for one in row] for row in source.sample()])
     except ValueError:
         return ""
-    width = rows.shape[1] if rows.ndim == 2 else 0
+    width, sides = rows.shape[1], rows[:, 1:5]
+    shares = bool(((sides >= 0.0) & (sides <= 1.0)).all())
     if width in (9, 10) and not (rows[:, :2] % 1.0).any() and (rows[:, 4:6] > 0.0).all():
         program = "MOT (frame, identity, left, top, width, height, confidence)"
         names, first, box = "frame body x y w h confidence", 1, "xywh"
-    elif (
-        width in (5, 6, 7)
-        and ((rows[:, 1:5] >= 0.0) & (rows[:, 1:5] <= 1.0)).all()
-        and not (rows[:, 0] % 1.0).any()
-    ):
+    elif width in (5, 6, 7) and shares and not (rows[:, 0] % 1.0).any():
         program = "YOLO (class, centre, size as shares of the image; state its pixels)"
         names, first, box = "x y w h", 2, "cxcywh@1920x1080"
     else:
@@ -335,8 +331,7 @@ def the_one_that_fits(
     """
     if not tables:
         raise FormatError(f"has no {what} that is a table")
-    wanted = options.sheet
-    if wanted is not None:
+    if (wanted := options.sheet) is not None:
         number = int(wanted) if wanted.isdecimal() and wanted not in tables else 0
         if wanted not in tables and not 1 <= number <= len(tables):
             raise FormatError(

@@ -68,10 +68,9 @@ def detect_delimiter(lines: list[str]) -> str:
     fields = [field for line in lines[:2] for field in line.split()]
     if len(fields) > len(lines[:2]) and all(_COMMA_DECIMAL.fullmatch(field) for field in fields):
         return " "
-    for delimiter in "\t;,":
-        if lines and all(delimiter in line for line in lines[:2]):
-            return delimiter
-    return next((delimiter for delimiter in "\t;," if lines and delimiter in lines[0]), " ")
+    in_all = [one for one in "\t;," if lines and all(one in line for line in lines[:2])]
+    in_first = [one for one in "\t;," if lines and one in lines[0]]
+    return next(iter(in_all + in_first), " ")
 
 
 def is_numeric_row(fields: list[str]) -> bool:
@@ -111,8 +110,7 @@ def read_header(
     fields = _without_trailing(split_fields(lines[at], separator))
     if not is_numeric_row(fields):
         return fields, separator, at + 1, True
-    previous = [line for line in lines[begin:at] if line.strip()]
-    if previous:
+    if previous := [line for line in lines[begin:at] if line.strip()]:
         commented = _without_trailing(split_fields(previous[-1].lstrip("# "), separator))
         if len(commented) == len(fields) > 1:
             return commented, separator, at, True

@@ -7,7 +7,6 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.track.types import Detection, Image, PixelToWorld, Rejected
@@ -176,8 +175,7 @@ class BlobDetector:
         """
         cv2 = self._cv2
         difference = self._difference(image)
-        limit = self._limit(difference)
-        mask = np.greater(difference, limit).view(np.uint8)
+        mask = np.greater(difference, self._limit(difference)).view(np.uint8)
         count, label, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
         areas = stats[1:, cv2.CC_STAT_AREA]
         kept, rejected = [], []
@@ -224,8 +222,7 @@ class BlobDetector:
         """Return the least difference that is no noise."""
         if self._contrast is not None:
             return self._contrast
-        counts = np.bincount(difference[::4, ::4].ravel(), minlength=256)
-        total = np.cumsum(counts)
+        total = np.cumsum(np.bincount(difference[::4, ::4].ravel(), minlength=256))
         noise = float(np.searchsorted(total, 0.84 * total[-1]))
         peak = float(np.searchsorted(total, total[-1] - max(self._least / 32.0, 1.0)))
         return max(_BLOBS.least_contrast, _BLOBS.noise_factor * noise, _BLOBS.share_of_peak * peak)
@@ -235,16 +232,15 @@ class BlobDetector:
             return []
         pixels = np.array([[column, row] for _, column, row in kept])
         in_pixels = np.stack([np.diag([_BLOBS.position_std_px**2] * 2)] * len(kept))
-        world: Floats | None = None
+        places: list[Any] = [(None, None)] * len(kept)
         if self.camera is not None:
-            world = self.camera.to_world(pixels)
+            places = self.camera.to_world(pixels).tolist()
             slopes = self.camera.jacobian(pixels)
             in_pixels = slopes @ in_pixels @ slopes.transpose(0, 2, 1)
         found = []
-        for index, (area, column, row) in enumerate(kept):
+        for (area, column, row), (x, y), spread in zip(kept, places, in_pixels, strict=True):
             covariance = np.full((3, 3), np.nan)
-            covariance[:2, :2] = in_pixels[index]
-            x, y = (float(v) for v in world[index]) if world is not None else (None, None)
+            covariance[:2, :2] = spread
             found.append(Detection(x, y, column, row, float("nan"), covariance, area))
         return found
 

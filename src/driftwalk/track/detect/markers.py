@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from driftwalk.core.arrays import Singles
 from driftwalk.core.errors import ConfigurationError
@@ -34,15 +34,12 @@ class MarkerColour(Section):
 
     section_name: ClassVar[str] = "colour"
 
-    a_star: Annotated[float, Quantity("1", ge=-128, le=128)] = Field(
-        description="Mean a* (green to red)."
-    )
-    b_star: Annotated[float, Quantity("1", ge=-128, le=128)] = Field(
-        description="Mean b* (blue to yellow)."
-    )
-    spread: Annotated[float, Quantity("1", gt=0, le=60)] = Field(
-        default=6.0, description="Standard deviation of a* and b* over the disc."
-    )
+    a_star: Annotated[float, Quantity("1", ge=-128, le=128)]
+    """Mean a* (green to red)."""
+    b_star: Annotated[float, Quantity("1", ge=-128, le=128)]
+    """Mean b* (blue to yellow)."""
+    spread: Annotated[float, Quantity("1", gt=0, le=60)] = 6.0
+    """Standard deviation of a* and b* over the disc."""
 
     @property
     def chroma(self) -> float:
@@ -77,20 +74,20 @@ class TwoColourMarker(Section):
     0.014
     """
 
-    kind: Literal["two_colour"] = Field(default="two_colour", description="Kind of the marker.")
-    spacing_m: Annotated[float, Quantity("m", gt=0, le=10)] = Field(
-        description="Distance between the centres of the two discs."
-    )
-    size_m: Annotated[float, Quantity("m", gt=0, le=10)] = Field(description="Diameter of a disc.")
-    angle_offset_rad: Annotated[float, Quantity("rad", ge=-math.pi, le=math.pi)] = Field(
-        default=0.0,
-        description="Direction from disc 1 to disc 2, counter-clockwise from the block's +x face.",
-    )
-    block_side_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
-        default=None, description="Side of the square block that carries the marker."
-    )
-    colour_1: MarkerColour = Field(description="Colour of the first disc.")
-    colour_2: MarkerColour = Field(description="Colour of the second disc.")
+    kind: Literal["two_colour"] = "two_colour"
+    """Kind of the marker."""
+    spacing_m: Annotated[float, Quantity("m", gt=0, le=10)]
+    """Distance between the centres of the two discs."""
+    size_m: Annotated[float, Quantity("m", gt=0, le=10)]
+    """Diameter of a disc."""
+    angle_offset_rad: Annotated[float, Quantity("rad", ge=-math.pi, le=math.pi)] = 0.0
+    """Direction from disc 1 to disc 2, counter-clockwise from the block's +x face."""
+    block_side_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = None
+    """Side of the square block that carries the marker."""
+    colour_1: MarkerColour
+    """Colour of the first disc."""
+    colour_2: MarkerColour
+    """Colour of the second disc."""
 
     @model_validator(mode="after")
     def _distinct(self) -> Self:

@@ -104,8 +104,7 @@ class TagDetector:
         up = np.array([1.0, -1.0])
         world = corners * up if self.camera is None else self.camera.to_world(corners)
         slopes = np.diag(up) if self.camera is None else self.camera.jacobian(pixel[None])[0]
-        edges = (world[1] - world[0]) + (world[2] - world[3])
-        along = edges / 2
+        along = ((world[1] - world[0]) + (world[2] - world[3])) / 2
         turn = np.array([-along[1], along[0]]) / float(along @ along)
         covariance = np.zeros((3, 3))
         # A corner of a tag is known to 0.15 px; chosen by hand.
@@ -113,18 +112,10 @@ class TagDetector:
         covariance[:2, :2] = one / 4
         # Four corners, each with half of the turn of its edge.
         covariance[2, 2] = float(turn @ one @ turn)
-        place = _crossing(world)
-        calibrated = self.camera is not None
-        return Detection(
-            x=float(place[0]) if calibrated else None,
-            y=float(place[1]) if calibrated else None,
-            column=float(pixel[0]),
-            row=float(pixel[1]),
-            theta=math.remainder(math.atan2(along[1], along[0]) - self._offset, 2 * math.pi),
-            covariance=covariance,
-            area_px=_area(corners),
-            key=name,
-        )
+        x, y = (None, None) if self.camera is None else _crossing(world).tolist()
+        column, row = pixel.tolist()
+        theta = math.remainder(math.atan2(along[1], along[0]) - self._offset, 2 * math.pi)
+        return Detection(x, y, column, row, theta, covariance, _area(corners), key=name)
 
 
 def _crossing(corners: Floats) -> Floats:

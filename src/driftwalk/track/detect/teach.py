@@ -145,8 +145,7 @@ def colours_seen(images: Sequence[Image]) -> list[ColourSeen]:
     chroma = np.hypot(a_star, b_star)
     coloured = chroma > _TEACH.least_chroma
     hue = np.arctan2(b_star[coloured], a_star[coloured])
-    weight = chroma[coloured]
-    counts, _ = np.histogram(hue, _TEACH.bins, (-math.pi, math.pi), weights=weight)
+    counts, _ = np.histogram(hue, _TEACH.bins, (-math.pi, math.pi), weights=chroma[coloured])
     # Around the circle, with the next two bins on each side.
     smooth = np.sum([np.roll(counts, k) * (3 - abs(k)) for k in range(-2, 3)], axis=0) / 9.0
     peak = (smooth >= np.roll(smooth, 1)) & (smooth > np.roll(smooth, -1))
@@ -202,12 +201,8 @@ def missing_colours(marker: TwoColourMarker, images: Sequence[Image]) -> str | N
     ]
     if not absent:
         return None
-    seen = colours_seen(images)
-    instead = (
-        f"seen instead: {', '.join(map(str, seen))}"
-        if seen
-        else ("no colour stands out: all is grey")
-    )
+    seen = ", ".join(map(str, colours_seen(images)))
+    instead = f"seen instead: {seen}" if seen else "no colour stands out: all is grey"
     return f"{' and '.join(absent)} never appear{'s' if len(absent) == 1 else ''}; {instead}"
 
 
@@ -291,26 +286,24 @@ def _measure(
             pairs.append((index, one, two))
     if not pairs:
         return None
-    spacing, size = float(np.median(distances)), float(np.median(diameters))
-    agree = np.abs(np.array(distances) - spacing) < _TEACH.spacing_off * spacing
-    agree &= np.abs(np.array(diameters) - size) < _TEACH.size_off * size
+    apart, across = np.array(distances), np.array(diameters)
+    spacing, size = float(np.median(apart)), float(np.median(across))
+    agree = np.abs(apart - spacing) < _TEACH.spacing_off * spacing
+    agree &= np.abs(across - size) < _TEACH.size_off * size
     number = int(agree.sum())
-    if (
-        number * 2 < len(pairs)
-        or spacing < _TEACH.nearest * size
-        or spacing > _TEACH.farthest * size
-    ):
+    nearest, farthest = _TEACH.nearest * size, _TEACH.farthest * size
+    if number * 2 < len(pairs) or not nearest <= spacing <= farthest:
         return None
     marker = TwoColourMarker(
         # To a hundredth of a millimetre.
-        spacing_m=round(float(np.mean(np.array(distances)[agree])), 5),
-        size_m=round(float(np.mean(np.array(diameters)[agree])), 5),
+        spacing_m=round(float(apart[agree].mean()), 5),
+        size_m=round(float(across[agree].mean()), 5),
         block_side_m=block_side,
         colour_1=colours[0],
         colour_2=colours[1],
     )
     chosen = [pair for pair, good in zip(pairs, agree, strict=True) if good]
-    return number, float(np.std(np.array(distances)[agree])) / spacing, marker, chosen
+    return number, float(apart[agree].std()) / spacing, marker, chosen
 
 
 def _mutual(first: list[Disc], second: list[Disc]) -> list[tuple[Disc, Disc]]:

@@ -92,8 +92,7 @@ def weighted_centres(
     for which, weight in enumerate(weights):
         centre, share = _centre(weight, start[which], reach)
         centres[which], shares[which] = centre, share / (math.pi * diameter**2 / 4.0)
-        both = _variance(cv2, weight, centre, reach)
-        variances[2 * which : 2 * which + 2], uneven[which] = both
+        variances[2 * which : 2 * which + 2], uneven[which] = _variance(cv2, weight, centre, reach)
     return Measured(centres, np.diag(variances), shares, float(uneven.max()) / diameter)
 
 
@@ -126,8 +125,7 @@ def _variance(cv2: Any, weight: Singles, centre: Floats, reach: float) -> tuple[
     whatever its source, and has twice a pixel's variance. Each pixel moves the mean by its distance
     times its noise over the mass.
     """
-    half = int(reach)
-    inside, square, harmonics = _window(half)
+    inside, square, harmonics = _window(int(reach))
     column, row = centre.tolist()
     around = cv2.getRectSubPix(weight, inside.shape, (column, row)) * inside
     noise = (around - around[::-1, ::-1]) ** 2

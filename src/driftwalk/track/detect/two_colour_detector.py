@@ -48,8 +48,6 @@ class Disc:
 
     Parameters
     ----------
-    colour : int
-        1 or 2.
     column, row : float
         Its centre [px].
     area : float
@@ -62,11 +60,10 @@ class Disc:
         Diameter of a whole disc here [px].
     """
 
-    colour: int
     column: float
     row: float
     area: float
-    box: tuple[float, float, float, float]
+    box: tuple[float, ...]
     share: float
     diameter: float
 
@@ -112,7 +109,7 @@ def find_regions(
     boxes = np.concatenate([corners * factor, ends * factor - 1], axis=1).astype(float)
     columns = (places[kept, 0], places[kept, 1], areas[kept], shares[kept], diameters[kept])
     return [
-        Disc(colour, column, row, area, tuple(box), share, diameter)
+        Disc(column, row, area, tuple(box), share, diameter)
         for box, column, row, area, share, diameter in zip(
             boxes.tolist(), *(column.tolist() for column in columns), strict=True
         )
@@ -183,16 +180,10 @@ def _together(first: Disc, second: Disc) -> Disc:
     area = first.area + second.area
     a, b = first.area / area, second.area / area
     return Disc(
-        first.colour,
         a * first.column + b * second.column,
         a * first.row + b * second.row,
         area,
-        (
-            min(first.box[0], second.box[0]),
-            min(first.box[1], second.box[1]),
-            max(first.box[2], second.box[2]),
-            max(first.box[3], second.box[3]),
-        ),
+        (*map(min, first.box[:2], second.box[:2]), *map(max, first.box[2:], second.box[2:])),
         first.share + second.share,
         first.diameter,
     )
@@ -363,9 +354,8 @@ class TwoColourDetector:
             Detections, and rejected candidates with the reason.
         """
         discs, rejected = self._discs(image)
-        pairs, alone = pair_discs(
-            discs[0], discs[1], spacing_per_diameter=self.marker.spacing_m / self.marker.size_m
-        )
+        ratio = self.marker.spacing_m / self.marker.size_m
+        pairs, alone = pair_discs(*discs, spacing_per_diameter=ratio)
         rejected += alone
         measured: list[tuple[Pair, Measured]] = []
         for pair in pairs:
@@ -379,7 +369,7 @@ class TwoColourDetector:
                 rejected.append(Rejected(float(column), float(row), area, reason, "hidden"))
         return self._place(measured), rejected
 
-    def _discs(self, image: Image) -> tuple[tuple[list[Disc], list[Disc]], list[Rejected]]:
+    def _discs(self, image: Image) -> tuple[list[list[Disc]], list[Rejected]]:
         """Return the candidates of both colours, and the regions that are none."""
         if not self._factor:
             # As small as it can be with the discs still found.
@@ -394,7 +384,7 @@ class TwoColourDetector:
             kept, wrong = sort_out(join_pieces(regions), colour=colour)
             both.append(kept)
             rejected += wrong
-        return (both[0], both[1]), rejected
+        return both, rejected
 
     def _diameter(self, points: Floats) -> Floats:
         """Return the diameter of a whole disc at points of the image [px]."""
@@ -444,7 +434,7 @@ class TwoColourDetector:
         found = []
         for (pair, result), ends, slopes in zip(measured, world, jacobians, strict=True):
             along = ends[1] - ends[0]
-            theta = math.atan2(along[1], along[0]) - self.marker.angle_offset_rad
+            angle = math.atan2(along[1], along[0]) - self.marker.angle_offset_rad
             to_world = np.zeros((4, 4))
             to_world[:2, :2], to_world[2:, 2:] = slopes
             turn = np.array([-along[1], along[0]]) / float(along @ along)
@@ -452,20 +442,12 @@ class TwoColourDetector:
             to_pose[:2, :2] = to_pose[:2, 2:] = np.eye(2) / 2
             to_pose[2, :2], to_pose[2, 2:] = -turn, turn
             lever = to_pose @ to_world
-            x, y = ends.mean(axis=0)
-            column, row = result.centres.mean(axis=0)
-            found.append(
-                Detection(
-                    x=float(x),
-                    y=float(y),
-                    column=float(column),
-                    row=float(row),
-                    theta=math.remainder(theta, 2 * math.pi),
-                    covariance=lever @ result.covariance @ lever.T,
-                    area_px=pair.first.area + pair.second.area,
-                    score=pair.score * result.visible,
-                )
-            )
+            x, y = ends.mean(axis=0).tolist()
+            column, row = result.centres.mean(axis=0).tolist()
+            theta = math.remainder(angle, 2 * math.pi)
+            covariance = lever @ result.covariance @ lever.T
+            area, score = pair.first.area + pair.second.area, pair.score * result.visible
+            found.append(Detection(x, y, column, row, theta, covariance, area, score=score))
         return found
 
 

@@ -22,7 +22,7 @@ STATES = 6
 
 
 def start_state(
-    measured: Floats, covariance: Floats, *, speed_std: float, turn_rate_std: float
+    measured: Floats, covariance: Floats, settings: TrackerSettings
 ) -> tuple[Floats, Floats]:
     """Return mean and covariance of bodies that were measured once.
 
@@ -32,8 +32,8 @@ def start_state(
         x, y [m], theta [rad]; theta NaN where there is none: then it is anywhere on the circle.
     covariance : ndarray, shape (n, 3, 3)
         Of the measurement [m, m, rad].
-    speed_std, turn_rate_std : float
-        Standard deviation of each velocity [m/s] and of the turn rate [rad/s].
+    settings : TrackerSettings
+        How fast bodies may be.
     """
     count = len(measured)
     mean = np.zeros((count, STATES))
@@ -44,8 +44,8 @@ def start_state(
     spread[blind, 2, :] = spread[blind, :, 2] = 0.0
     # Variance of an angle that is uniform on the circle.
     spread[blind, 2, 2] = math.pi**2 / 3.0
-    spread[:, 3, 3] = spread[:, 4, 4] = speed_std**2
-    spread[:, 5, 5] = turn_rate_std**2
+    spread[:, 3, 3] = spread[:, 4, 4] = settings.speed_std**2
+    spread[:, 5, 5] = settings.turn_rate_std**2
     return mean, spread
 
 
@@ -70,7 +70,7 @@ def predict(
     after = np.einsum("nij,nj->ni", move, mean)
     after[:, 2] = wrap_angle(after[:, 2])
     spread = move @ covariance @ move.transpose(0, 2, 1)
-    straight, turning = motion.acceleration_density, motion.angular_acceleration_density
+    straight, turning = motion
     for axis, density in enumerate((straight, straight, turning)):
         spread[:, axis, axis] += density * elapsed**3 / 3.0
         spread[:, axis, axis + 3] += density * elapsed**2 / 2.0

@@ -88,19 +88,15 @@ class Marks:
         likely = {(i, j) for i, j, score in exchanges if score >= self._settings.ambiguous_above}
         for one, other in sorted({(i, j) for i, j, _ in exchanges} | meeting):
             first, second = tracks[one], tracks[other]
-            since = before[first].get(second, frame)
-            first.neighbours[second] = second.neighbours[first] = since
+            first.neighbours[second] = second.neighbours[first] = before[first].get(second, frame)
         for track in tracks:
             if track.measured is None and track.samples.last_frame == frame - 1:
                 track.lost_beside = {}
+        # Of two that may be taken for each other, when one is lost now.
         for one, other in likely | meeting:
-            self._note_loss(tracks[one], tracks[other], frame)
-
-    def _note_loss(self, one: Track, other: Track, frame: int) -> None:
-        """Note of two that may be taken for each other that they were, when one is lost now."""
-        for lost, beside in ((one, other), (other, one)):
-            if lost.measured is None and lost.samples.last_frame == frame - 1:
-                lost.lost_beside[beside] = lost.neighbours[beside]
+            for lost, beside in ((tracks[one], tracks[other]), (tracks[other], tracks[one])):
+                if lost.measured is None and lost.samples.last_frame == frame - 1:
+                    lost.lost_beside[beside] = lost.neighbours[beside]
 
     def doubt(self, tracks: Iterable[Track], parted: Sequence[Track], frame: int) -> None:
         """Mark tracks whose assignment was a close thing, or that came back near others."""
@@ -174,20 +170,13 @@ class Alternatives:
         Both are compared with the same: that the track as it is was missed.
         """
         cost = np.full((len(tracks), len(measured.pose)), np.inf)
-        having = [
-            (row, track.alternative)
-            for row, track in enumerate(tracks)
-            if track.alternative is not None
-        ]
-        if having and len(measured.pose):
-            alternatives = [alternative for _, alternative in having]
-            predicted = predicted_of(alternatives, time, [True] * len(alternatives))
-            lead = np.array(
-                [self._lead(tracks[row], alternative, frame) for row, alternative in having]
-            )
-            cost[[row for row, _ in having]] = (
-                edge_costs(predicted, measured, self._settings) + lead[:, None]
-            )
+        rows = [row for row, track in enumerate(tracks) if track.alternative is not None]
+        held = [track.alternative for track in tracks if track.alternative is not None]
+        if rows and len(measured.pose):
+            predicted = predicted_of(held, time, [True] * len(rows))
+            pairs = zip(rows, held, strict=True)
+            lead = np.array([self._lead(tracks[row], one, frame) for row, one in pairs])
+            cost[rows] = edge_costs(predicted, measured, self._settings) + lead[:, None]
         return cost
 
     def settle(
@@ -213,23 +202,18 @@ class Alternatives:
         """
         for row, track in enumerate(tracks):
             taken = int(detection[row])
-            if track.alternative is None:
-                cost = float(own[row, taken]) if taken >= 0 else math.inf
-            elif taken < 0:
-                self._miss(track, track.alternative, frame)
-                continue
-            else:
-                lead = float(alternative[row, taken] - own[row, taken])
-                lag = self._lead(track, track.alternative, frame)
-                cost = float(own[row, taken] if lead >= 0.0 else alternative[row, taken] - lag)
-                self._seen(track, track.alternative, lead, frame)
-            doubtful = taken >= 0 and cost > -self._beyond_doubt
-            if (
-                track.alternative is None
-                and doubtful
-                and track.body is not None
-                and track.key is None
-            ):
+            seen, held, cost = taken >= 0, track.alternative, math.inf
+            if held is not None:
+                lead = lag = self._lead(track, held, frame)
+                if seen:
+                    lead = float(alternative[row, taken] - own[row, taken])
+                    cost = float(own[row, taken] if lead >= 0.0 else alternative[row, taken] - lag)
+                self._weigh(track, held, lead, frame, seen=seen)
+            elif seen:
+                cost = float(own[row, taken])
+            doubtful = seen and cost > -self._beyond_doubt
+            named = track.body is not None and track.key is None
+            if track.alternative is None and doubtful and named:
                 track.alternative = track.without(frame, -cost)
 
     def _lead(self, track: Track, alternative: Alternative, frame: int) -> float:
@@ -237,32 +221,20 @@ class Alternatives:
         seen_just_now = track.samples.last_frame == frame - 1
         return alternative.lead + (self._miss_tells if seen_just_now else 0.0)
 
-    def _miss(self, track: Track, alternative: Alternative, frame: int) -> None:
-        """Weigh that nothing was seen."""
-        alternative.lead = self._lead(track, alternative, frame)
-        if alternative.lead < 0.0:
-            self._go_back(track, alternative)
-        elif alternative.time - alternative.seen > self._settings.lost_after:
-            self._leave_open(track, alternative, frame)
-
-    def _seen(self, track: Track, alternative: Alternative, lead: float, frame: int) -> None:
-        """Weigh a detection by how much better the track explains it than its alternative."""
+    def _weigh(
+        self, track: Track, alternative: Alternative, lead: float, frame: int, *, seen: bool
+    ) -> None:
+        """Weigh by how much better the track explains a detection, or that nothing was seen."""
         if lead < 0.0:
-            self._go_back(track, alternative)
-            if -lead < self._beyond_doubt:
+            self._counts["taken_back"] += len(track.samples) - alternative.samples
+            track.go_back(alternative)
+            if seen and -lead < self._beyond_doubt:
                 self._marks.add(track, track.samples.last_frame, frame, math.exp(lead))
-        elif lead >= self._beyond_doubt:
+        elif seen and lead >= self._beyond_doubt:
             track.alternative = None
         else:
             alternative.lead = lead
+            # It was not settled in the time in which a body is given up.
             if alternative.time - alternative.seen > self._settings.lost_after:
-                self._leave_open(track, alternative, frame)
-
-    def _go_back(self, track: Track, alternative: Alternative) -> None:
-        self._counts["taken_back"] += len(track.samples) - alternative.samples
-        track.go_back(alternative)
-
-    def _leave_open(self, track: Track, alternative: Alternative, frame: int) -> None:
-        """Mark what was not settled in the time in which a body is given up."""
-        self._marks.add(track, alternative.since, frame, alternative.score)
-        track.alternative = None
+                self._marks.add(track, alternative.since, frame, alternative.score)
+                track.alternative = None

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from driftwalk.core.errors import ConfigurationError
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """How fast velocities wander: spectral densities of the white accelerations."""
 
     acceleration_density: float
@@ -78,10 +78,9 @@ class TrackerSettings:
         """Check the ranges."""
         for name in ("max_speed", "max_turn_rate", "turn_time", "lost_after", "clutter_density"):
             self._require(name, math.isfinite(getattr(self, name)) and getattr(self, name) > 0)
-        self._require("bounce_probability", 0 < self.bounce_probability < 1)
+        for name in ("bounce_probability", "detection_probability", "return_probability"):
+            self._require(name, 0 < getattr(self, name) < 1)
         self._require("gate", math.isfinite(self.gate) and self.gate >= 1)
-        self._require("detection_probability", 0 < self.detection_probability < 1)
-        self._require("return_probability", 0 < self.return_probability < 1)
         self._require("ambiguous_above", 0 < self.ambiguous_above <= 1)
         self._require("confirm_after", self.confirm_after >= 1)
         self._require("bodies", self.bodies is None or self.bodies >= 1)

@@ -188,9 +188,7 @@ class Tracker:
     def _predict(self, time: float) -> None:
         if not self._tracks:
             return
-        alternatives = [
-            track.alternative for track in self._tracks if track.alternative is not None
-        ]
+        alternatives = filter(None, (track.alternative for track in self._tracks))
         both: list[Followed] = [*self._tracks, *alternatives]
         elapsed = np.array([time - one.time for one in both])
         mean, covariance = predict(*stacked(both), elapsed, self.settings.motion)
@@ -208,8 +206,7 @@ class Tracker:
             return set()
         tracks, frame = self._tracks, now.number
         missed = [track.samples.last_frame < frame - 1 for track in tracks]
-        predicted = predicted_of(tracks, now.time, missed)
-        cost = edge_costs(predicted, now.measured, self.settings)
+        cost = edge_costs(predicted_of(tracks, now.time, missed), now.measured, self.settings)
         alternative = self._alternatives.costs(tracks, now.measured, now.time, frame)
         _obey_keys(cost, tracks, now.found)
         _obey_keys(alternative, tracks, now.found)
@@ -270,12 +267,7 @@ class Tracker:
         if not left:
             return
         poses, covariances = now.measured.pose[left], now.measured.covariance[left]
-        mean, covariance = start_state(
-            poses,
-            covariances,
-            speed_std=self.settings.speed_std,
-            turn_rate_std=self.settings.turn_rate_std,
-        )
+        mean, covariance = start_state(poses, covariances, self.settings)
         for place, j in enumerate(left):
             track = Track(
                 mean=mean[place],
@@ -309,17 +301,10 @@ class Tracker:
     def _state(self, track: Track) -> TrackState:
         assert track.body is not None
         x, y, theta, vx, vy, omega = track.mean.tolist()
-        return TrackState(
-            self._naming.names[track.body],
-            x,
-            y,
-            theta if track.oriented else math.nan,
-            vx,
-            vy,
-            omega if track.oriented else math.nan,
-            track.measured,
-            track.score,
-        )
+        if not track.oriented:
+            theta = omega = math.nan
+        name = self._naming.names[track.body]
+        return TrackState(name, x, y, theta, vx, vy, omega, track.measured, track.score)
 
 
 def _obey_keys(cost: Floats, tracks: Sequence[Track], found: Sequence[Detection]) -> None:

@@ -18,7 +18,6 @@ COVARIANCE: Final = ("xx", "xy", "yy", "xtheta", "ytheta", "thetatheta")
 """The parts of the covariance of a measurement, in the order in which they are kept."""
 _ROWS, _COLUMNS = np.array([0, 0, 1, 0, 1, 2]), np.array([0, 1, 1, 2, 2, 2])
 """Places of the parts of `COVARIANCE` in the matrix."""
-# Smallest variance of a measurement, so that a perfect one has a likelihood too.
 
 
 class TrackState(NamedTuple):

@@ -47,7 +47,7 @@ def unfinished(path: Path) -> Path:
 
 
 def work_in(path: Path) -> None:
-    with RunDirectory(path, specification=SPECIFICATION, on_existing="overwrite") as run:
+    with RunDirectory(path, specification=SPECIFICATION, overwrite=True) as run:
         run_sweep(lambda u: {"a": u.settings["a"]}, UNITS, store=run.store("coarse"))
         run.write("calibration.nc", b"2")
         run.write("figures/map.svg", b"<svg></svg>")

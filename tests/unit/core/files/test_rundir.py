@@ -16,7 +16,7 @@ import pytest
 import driftwalk
 from driftwalk.core.errors import InputError, RunDirectoryError
 from driftwalk.core.files.run_layout import state_of
-from driftwalk.core.files.rundir import OnExisting, RunDirectory
+from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.core.provenance import file_sha256, manifest, read_manifest
 from driftwalk.sweep import grid, run_sweep
 
@@ -90,25 +90,15 @@ def test_unfinished_run_of_another_study_is_refused_by_key(tmp_path: Path) -> No
         assert run.state == "unfinished"
 
 
-@pytest.mark.parametrize("mode", ["resume", "refuse"])
-def test_finished_run_is_refused(tmp_path: Path, mode: OnExisting) -> None:
+def test_finished_run_is_refused(tmp_path: Path) -> None:
     finish(tmp_path / "run")
     before = visible(tmp_path / "run")
     with (
         pytest.raises(RunDirectoryError, match=r"holds a finished run; .*`overwrite=True`"),
-        RunDirectory(tmp_path / "run", specification=SPECIFICATION, on_existing=mode),
+        RunDirectory(tmp_path / "run", specification=SPECIFICATION),
     ):
         pass
     assert visible(tmp_path / "run") == before
-
-
-def test_refuse_means_unfinished_runs_too(tmp_path: Path) -> None:
-    leave_unfinished(tmp_path / "run")
-    with (
-        pytest.raises(RunDirectoryError, match="holds an unfinished run"),
-        RunDirectory(tmp_path / "run", specification=SPECIFICATION, on_existing="refuse"),
-    ):
-        pass
 
 
 def test_overwrite_moves_a_finished_run(tmp_path: Path) -> None:
@@ -116,7 +106,7 @@ def test_overwrite_moves_a_finished_run(tmp_path: Path) -> None:
     finish(path, content=b"old")
     (path / "notes.txt").write_text("mine")
     for expected in (1, 2):
-        with RunDirectory(path, specification=SPECIFICATION, on_existing="overwrite") as run:
+        with RunDirectory(path, specification=SPECIFICATION, overwrite=True) as run:
             assert run.state == "new"
             assert run.moved_to is not None
             run.write("calibration.nc", b"new")
@@ -133,7 +123,7 @@ def test_overwrite_moves_a_finished_run(tmp_path: Path) -> None:
 
 def test_overwrite_moves_an_unfinished_run_of_another_study(tmp_path: Path) -> None:
     leave_unfinished(tmp_path / "run")
-    with RunDirectory(tmp_path / "run", specification=OTHER, on_existing="overwrite") as run:
+    with RunDirectory(tmp_path / "run", specification=OTHER, overwrite=True) as run:
         assert run.state == "new"
         moved = run.moved_to
     assert moved is not None
@@ -144,19 +134,17 @@ def test_overwrite_moves_an_unfinished_run_of_another_study(tmp_path: Path) -> N
 
 def test_overwrite_repeated_after_a_kill_continues(tmp_path: Path) -> None:
     leave_unfinished(tmp_path / "run")
-    with RunDirectory(
-        tmp_path / "run", specification=SPECIFICATION, on_existing="overwrite"
-    ) as run:
+    with RunDirectory(tmp_path / "run", specification=SPECIFICATION, overwrite=True) as run:
         assert run.state == "unfinished"
         assert run.moved_to is None
 
 
-@pytest.mark.parametrize("mode", ["resume", "refuse", "overwrite"])
-def test_folder_with_foreign_files_is_left_alone(tmp_path: Path, mode: OnExisting) -> None:
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_folder_with_foreign_files_is_left_alone(tmp_path: Path, overwrite: bool) -> None:
     (tmp_path / "manifest.json").write_text('{"name": "a web page"}')
     with (
         pytest.raises(RunDirectoryError, match=r"files but no run of driftwalk \(manifest\.json"),
-        RunDirectory(tmp_path, specification=SPECIFICATION, on_existing=mode),
+        RunDirectory(tmp_path, specification=SPECIFICATION, overwrite=overwrite),
     ):
         pass
     assert [p.name for p in tmp_path.iterdir()] == ["manifest.json"]
@@ -245,11 +233,6 @@ def test_bad_names_of_results(tmp_path: Path, name: str) -> None:
     with run, pytest.raises(InputError, match="name"):
         run.write(name, b"x")
     assert visible(tmp_path / "run") == [".run.json"]
-
-
-def test_unknown_mode() -> None:
-    with pytest.raises(InputError, match="expected one of resume, refuse, overwrite, got 'ask'"):
-        RunDirectory("run", specification={}, on_existing="ask")  # type: ignore[arg-type]
 
 
 def test_damaged_record_is_refused(tmp_path: Path) -> None:

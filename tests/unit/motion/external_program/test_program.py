@@ -405,7 +405,7 @@ def test_a_program_without_parameters_is_refused(fault, message):
 
 
 def pids(model: ProgramModel) -> list[int]:
-    return [program._process.pid for program in model._pool._idle]
+    return [program._process.pid for program in model._idle]
 
 
 def kill(model: ProgramModel) -> None:
@@ -425,10 +425,10 @@ def test_a_copy_of_this_process_starts_programs_of_its_own():
     """After a fork both have the pipes of the same program: it is its parent's."""
     model = motion_model(address())
     expected = model.simulate(VALUES, LIKE, KEYS)
-    (theirs,) = model._pool._idle
+    (theirs,) = model._idle
     theirs._owner -= 1
     assert_same(model.simulate(VALUES, LIKE, KEYS), expected, "another program, another world")
-    assert theirs not in model._pool._idle
+    assert theirs not in model._idle
     theirs.close()
     # It is not killed. Here, though, nobody else holds its input open, and so it comes to its end.
     assert theirs._process.wait(10.0) == 0

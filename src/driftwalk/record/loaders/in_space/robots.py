@@ -141,8 +141,7 @@ def _refuse_nested(path: Path) -> None:
         return
     # A larger description would name more than a thousand files; its reader takes a second for
     # that.
-    content = read_bounded(description, most=MIB // 4)
-    marks = re.findall(rb"[\[\]{}]", content)
+    marks = re.findall(rb"[\[\]{}]", read_bounded(description, most=MIB // 4))
     if max(accumulate((1 if mark in b"[{" else -1 for mark in marks), initial=0)) > MOST_LEVELS:
         raise FormatError(
             f"holds values nested more than {MOST_LEVELS} levels deep, as no bag does: it is "
@@ -204,8 +203,7 @@ class EurocLoader:
         names = [name.lstrip("# ") for name in first_row(path)]
         matches = filter(None, map(_PART.fullmatch, names))
         columns = {"".join(one.groups()).removeprefix("p"): one[0] for one in matches}
-        lacking = [axis for axis in "xyz" if axis not in columns]
-        if lacking:
+        if lacking := [axis for axis in "xyz" if axis not in columns]:
             raise FormatError(f"the header names no column of p_…_{lacking[0]}", line=1)
         wanted = ("x", "y", "z", *(PARTS if set(PARTS) <= set(columns) else ()))
         used = {part: columns[part] for part in wanted}

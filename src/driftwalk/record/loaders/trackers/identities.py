@@ -427,8 +427,7 @@ def _of_csv(path: Path) -> _Columns:
     if len(units) > 1:
         raise FormatError("the columns of positions name different units", line=1)
     table = read_table(path, TableLayout(",", names, 1, tuple(used)))
-    columns = {bare: table.numbers[at] for at, bare in used.items()}
-    return _Columns(columns, next(iter(units), ""))
+    return _Columns({bare: table.numbers[at] for at, bare in used.items()}, next(iter(units), ""))
 
 
 LOADERS = (IdTrackerLoader(), IdTrackerAiLoader(), TrexLoader())

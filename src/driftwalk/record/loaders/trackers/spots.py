@@ -40,15 +40,13 @@ class TrackMateLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the names of the spots' columns."""
-        needed = {"TRACK_ID", "POSITION_X", "POSITION_Y"}
-        return 0.95 if needed <= set(first_names(head)) else 0.0
+        return 0.95 if {"TRACK_ID", "POSITION_X", "POSITION_Y"} <= set(first_names(head)) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every track; `frame_rate` counts frames in place of the file's times."""
         rows = [split_fields(line, ",") for line in header_rows(path, 5)]
         names = rows[0] if rows else []
-        missing = [name for name in NEEDED if name not in names]
-        if missing:
+        if missing := [name for name in NEEDED if name not in names]:
             raise FormatError(f"no column {', '.join(missing)} as TrackMate has it", line=1)
         places = {name: names.index(name) for name in NEEDED}
         # Three rows that explain the names may stand below them.
@@ -196,8 +194,7 @@ def _parsed(path: Path) -> _Contents:
             parser.Parse(b"", True)
     except (expat.ExpatError, LookupError, ValueError) as error:
         # expat asks Python for encodings that it lacks.
-        lacks = isinstance(error, KeyError)
-        what = f"an element lacks its attribute {error}" if lacks else error
+        what = f"an element lacks its attribute {error}" if isinstance(error, KeyError) else error
         raise FormatError(f"is damaged XML: {what}", line=parser.CurrentLineNumber) from error
     return contents
 
@@ -245,8 +242,7 @@ def _of_store(path: Path) -> dict[str, Array]:
     with opened_hdf5(path) as contents:
         groups = [str(name) for name in contents.file]
         numbered = [name for name in groups if name.removeprefix("Frame_").isdecimal()]
-        frames = sorted(numbered, key=lambda name: int(name.removeprefix("Frame_")))
-        if frames:
+        if frames := sorted(numbered, key=lambda name: int(name.removeprefix("Frame_"))):
             parts = [_columns(frame_in(contents, name)) for name in frames]
             return {name: np.concatenate([part[name] for part in parts]) for name in OF_TRACKPY}
         return _columns(_only_table(contents, groups))
