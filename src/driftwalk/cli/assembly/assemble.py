@@ -24,7 +24,7 @@ def assemble(
     earlier: Annotated[
         Path | None,
         option(
-            "--from RUN",
+            "--earlier-fit RUN",
             "Fit of glued blocks, or of free blocks in one recording: drag of hidden faces, shared "
             "stirring.",
             show_default=False,
