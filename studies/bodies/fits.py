@@ -3,9 +3,9 @@
     python studies/bodies/fits.py SET OUT.jsonl [--count N] [--no-check]
 
 SET is a folder that `recordings.py` filled. Of a pair the single block is fitted first; its fit is
-where that of the dimer begins, as `driftwalk fit dimer.csv --body-shape xx --from fit/` does. The
-seconds are processor time of the fit alone, without reading, check and figures. Recordings that are
-in OUT.jsonl are not fitted again.
+where that of the dimer begins, as `driftwalk fit dimer.csv --body-shape xx --earlier-fit fit/`
+does. The seconds are processor time of the fit alone, without reading, check and figures.
+Recordings that are in OUT.jsonl are not fitted again.
 """
 
 from __future__ import annotations

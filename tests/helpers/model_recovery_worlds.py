@@ -38,7 +38,7 @@ def made_up_recovery(found: dict[str, Any] | None = None) -> xr.Dataset:
     count = {"recover.recordings": len(chosen["status"]), "recover.durations_s": [600.0]}
     study = dw.apply_overrides(dw.Study(), {**count, "observation.position_noise_m": 3e-4})
     model = dw.motion_model("active")
-    return ModelRecovery(study, model, VALUES).dataset(chosen)
+    return ModelRecovery(study, model, VALUES).result(chosen)
 
 
 def lost(found: dict[str, Any], which: int, status: int, message: str) -> dict[str, Any]:

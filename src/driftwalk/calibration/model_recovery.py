@@ -157,9 +157,9 @@ class ModelRecovery(EstimationMethod["xr.Dataset"]):
         # Only work of this process can say how far it is within a recording.
         within = partial(_tell_stage, tell, self) if executor is None else None
         method = replace(self, threads=threads_of_unit(threads, executor), within=within)
-        return method.sweep(store, executor, tell)
+        return method.sweep(store=store, executor=executor, progress=self.counted(tell))
 
-    def dataset(self, found: Mapping[str, Any]) -> xr.Dataset:
+    def result(self, found: Mapping[str, Any]) -> xr.Dataset:
         """Return the `model_recovery`."""
         parameters, study = self.model.parameters, self.study
         exact = self.values

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, NamedTuple, TypeVar
 
@@ -15,11 +14,12 @@ from driftwalk.calibration.estimation.identifiability import DETERMINED, relativ
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.intervals import proportion_interval
+from driftwalk.core.progress import Progress
 from driftwalk.core.random_streams import RecoveryStream, world_keys
 from driftwalk.model import Study
 from driftwalk.schema import Parameter
 from driftwalk.schema.kinds.recovery import ESTIMATED, NOT_ESTIMATED, NOT_SIMULATED
-from driftwalk.sweep import Design, Store, WorkUnit, run_sweep
+from driftwalk.sweep import SweepStudy, WorkUnit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,7 +36,7 @@ class BrokenSimulation(InputError):
 
 
 @dataclass(frozen=True)
-class EstimationMethod(ABC, Generic[RecordingT]):
+class EstimationMethod(SweepStudy["xr.Dataset"], Generic[RecordingT]):
     """A way to estimate parameters, and a study that says how its recordings are simulated.
 
     A sweep calls it with one setting at a time, on whichever worker computes it.
@@ -53,29 +53,9 @@ class EstimationMethod(ABC, Generic[RecordingT]):
     parts: ClassVar[int] = 1
     """Parts of a recording in which progress is counted."""
 
-    def sweep(self, store: Store | None, executor: Executor | None, tell: Tell) -> xr.Dataset:
-        """Simulate and estimate all recordings, and return the dataset of the study."""
-        self.check()
-        design = self.design()
-
-        def told(done: int, total: int) -> None:
-            tell(self.parts * done, self.parts * total, self.work)
-
-        units = design.units(1)
-        found = run_sweep(self, units, store=store, executor=executor, progress=told)
-        return self.dataset(design.unstack(found))
-
-    @abstractmethod
-    def design(self) -> Design:
-        """Return the settings of the recordings."""
-
-    @abstractmethod
-    def dataset(self, found: Mapping[str, Any]) -> xr.Dataset:
-        """Return the dataset of the study, from arrays with the dimensions of the design."""
-
-    @abstractmethod
-    def check(self) -> None:
-        """Raise what forbids the whole study."""
+    def counted(self, tell: Tell) -> Progress:
+        """Return a progress that counts the parts of recordings."""
+        return lambda done, total: tell(self.parts * done, self.parts * total, self.work)
 
     @abstractmethod
     def simulate(self, setting: Mapping[str, Any]) -> RecordingT:
@@ -105,7 +85,7 @@ class EstimationMethod(ABC, Generic[RecordingT]):
         return {
             **{name: np.asarray(value)[None] for name, value in found.items()},
             "status": np.array([status], dtype=np.int32),
-            "message": np.array([message[:400]], dtype="U400"),
+            "message": np.array([message], dtype=object),
         }
 
     def seed_of(self, recording: int, stream: RecoveryStream) -> int:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from driftwalk.cli.inputs.model_source import given_files, load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
-from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared_types import (
     Json,
     Overwrite,
@@ -23,9 +21,7 @@ from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result
 from driftwalk.cli.terminal.progress import reported
-from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import FIT_KEYS
-from driftwalk.core.units import parse_quantity
 
 RecordingFiles = Annotated[
     list[Path],
@@ -33,9 +29,7 @@ RecordingFiles = Annotated[
 ]
 
 
-@with_options(
-    RecordingOptions, *(one.name for one in fields(RecordingOptions) if one.name != "start")
-)
+@with_recording_options
 @with_study_options(
     FIT_KEYS,
     *("body_shape", "side", "mass", "depth", "force_interval"),
@@ -54,10 +48,9 @@ def fit(
         "Flow that was measured, as by PIV, steady or a series: the prior of the fitted flow.",
         callback=flow_of_run,
     ),
-    start: str | None = optional(
-        "--from s|RUN",
-        "First time to keep; or, for glued blocks (--body-shape xx), the finished fit of one "
-        "block in the same water.",
+    earlier: Path | None = optional(
+        "--earlier-fit RUN",
+        "For glued blocks (--body-shape xx): the finished fit of one block in the same water.",
     ),
     interaction: bool = flag(
         "--interaction",
@@ -85,12 +78,9 @@ def fit(
     from driftwalk.schema.answers.fit import checked_parts, fitted_parts
     from driftwalk.schema.runs import run_kind
 
-    earlier = None if start is None or not Path(start).is_dir() else Path(start)
     before = None if earlier is None else read_earlier_fit(earlier)
     if interaction:
         given = given.and_also({"fit.interaction": True}, keys=FIT_KEYS)
-    if start is not None and earlier is None:
-        how = replace(how, start=_first_time(start))
     read = read_for_run(recordings, given, how, before=before)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     fitted = earlier and earlier / run_kind("fit").file
@@ -131,11 +121,3 @@ def fit(
         print_result(found.fit, out, json=True, check=found.check)
     else:
         print_places(found.fit, out, sentences(found.fit, "warning"))
-
-
-def _first_time(text: str) -> float:
-    """Return the first time to keep [s], where no folder of a run has that name."""
-    try:
-        return float(parse_quantity(text, "s"))
-    except ConfigurationError as error:
-        raise InputError(f"--from {text}: no time in s, and no folder of a finished fit") from error

@@ -157,11 +157,11 @@ class FitRecovery(EstimationMethod["SimulatedTracks"]):
     ) -> xr.Dataset:
         """Fit recordings in processes of this machine, or on other workers."""
         if executor or threads is None:
-            return self.sweep(store, executor, tell)
+            return self.sweep(store=store, executor=executor, progress=self.counted(tell))
         with single_threaded_processes(threads) as workers:
-            return self.sweep(store, workers, tell)
+            return self.sweep(store=store, executor=workers, progress=self.counted(tell))
 
-    def dataset(self, found: Mapping[str, Any]) -> xr.Dataset:
+    def result(self, found: Mapping[str, Any]) -> xr.Dataset:
         """Return the `recovery`."""
         import xarray as xr
 

@@ -20,7 +20,7 @@ def test_a_dimer_tells_hidden_drag_and_shared_stirring(tmp_path: Path) -> None:
     fit, dimer = tmp_path / "fit", tmp_path / "dimer"
     stated = ("--side", "3cm", "--mass", "11.6g", "--force-interval", "10ms")
     answer(here("fit", one, "--tank", "32cm", *stated, "--no-check", "-o", fit, "--json"))
-    glued = ("--body-shape", "xx", "--from", fit, "--no-check", "--json")
+    glued = ("--body-shape", "xx", "--earlier-fit", fit, "--no-check", "--json")
     found = answer(here("fit", two, *glued, "-o", dimer))
     # Twice the interval: what is tested is that the numbers are those of the recording.
     for name, truth in (("hidden_face_drag_share", HIDDEN), ("stirring_correlation", RHO)):
@@ -30,7 +30,7 @@ def test_a_dimer_tells_hidden_drag_and_shared_stirring(tmp_path: Path) -> None:
     assert found["stirring_length_m"] == pytest.approx(LENGTH, rel=0.2)
     assert found["stirring_misfit_std"] < 4.0
     few = ("--runs", "40", "--duration", "20s", "--film", "none", "--json")
-    predicted = answer(here("assemble", fit, "--from", dimer, *few, "-o", tmp_path / "four"))
+    predicted = answer(here("assemble", fit, "--earlier-fit", dimer, *few, "-o", tmp_path / "four"))
     assert float(predicted["hidden_face_drag"]) == found["hidden_face_drag_share"]
     assert {"hidden_face_drag_share", "stirring_length"} <= {*predicted["drawn"]["parameters"]}
     again = dw.fit(dw.load(two), body_shape="xx", earlier=fit, check=False)
@@ -63,7 +63,7 @@ def test_a_fit_in_memory_does_not_hold_its_recordings() -> None:
 def test_what_cannot_be_glued_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "one.csv"
     path.write_text("t_s,x_m,y_m\n0,0,0\n1,0.01,0\n")
-    missing = here("fit", path, "--from", tmp_path, "-o", tmp_path / "out")
+    missing = here("fit", path, "--earlier-fit", tmp_path, "-o", tmp_path / "out")
     assert missing.code == 2
     assert "fit" in missing.err
     for shape, words in (

@@ -47,7 +47,7 @@ def test_two_free_blocks_tell_the_length_of_the_stirring(tmp_path: Path) -> None
     assert found["stirring_misfit_std"] < 4.0
     assert found["recording"] == "two-blocks.csv (1), two-blocks.csv (2)"
     few = ("--runs", "8", "--duration", "5s", "--film", "none", "--json")
-    done = here("assemble", fit, "--from", fit, *few, "-o", tmp_path / "four")
+    done = here("assemble", fit, "--earlier-fit", fit, *few, "-o", tmp_path / "four")
     assert done.code == 0
     assert f"length of the stirring {found['stirring_length_m']:.2g}" in done.err
     length = parse_study(xr.open_dataset(tmp_path / "four" / "assembly.nc").attrs["study"])

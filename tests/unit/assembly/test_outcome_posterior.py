@@ -38,13 +38,11 @@ from driftwalk.assembly.outcome_posterior.region import (
     self_check,
     weights_of,
 )
-from driftwalk.assembly.sensitivity.settings import sweep_texts
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.page.sections.outcome_posterior import posterior_summary
 from driftwalk.schema import build_trajectory
 from driftwalk.schema.answers.outcome_posterior import outcome_posterior_answer
 from driftwalk.schema.answers.parts import Row
-from driftwalk.sweep import SweepError, WorkUnit, grid
 
 FLOW = dw.tank30_flow()
 
@@ -365,14 +363,3 @@ def test_the_error_of_the_emulator_is_that_of_each_kind_of_data() -> None:
         error = 3 * (share * variance).sum(axis=1) / (share.shape[1] - 1)
         assert noise == pytest.approx(float((weight * error).sum()))
     assert found.noise[CLASSES] != found.noise[TIMES]
-
-
-@pytest.mark.parametrize("fault", [InputError("no room for the blocks"), ValueError("a bug")])
-def test_a_mistake_of_the_user_is_raised_as_it_is(fault: Exception) -> None:
-    def fail(unit: WorkUnit) -> dict[str, np.ndarray]:
-        raise fault
-
-    units = grid(node=np.arange(2)).units(1)
-    with pytest.raises(InputError if isinstance(fault, InputError) else SweepError) as caught:
-        sweep_texts(fail, units, store=None)
-    assert fault in (caught.value, caught.value.__cause__)

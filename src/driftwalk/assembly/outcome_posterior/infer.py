@@ -169,7 +169,7 @@ class _Course:
     def simulate(self, name: str, nodes: Nodes) -> list[list[Record]]:
         """Simulate nodes, and say how many runs are done."""
         each, begun = nodes.study.sensitivity.runs, self.done
-        found = nodes.simulate(
+        found = nodes.sweep(
             store=None if self.store is None else self.store(name),
             progress=lambda done, _: self._say(begun + done * each),
             executor=self.executor,

@@ -36,7 +36,6 @@ from driftwalk.assembly.sensitivity.settings import (
     make_settings,
     place_first,
     simulate_pieces,
-    sweep_texts,
     world_plan,
 )
 from driftwalk.core.arrays import Floats
@@ -45,14 +44,14 @@ from driftwalk.core.files.shards import Arrays
 from driftwalk.core.study_keys import INFERRED_KEYS, INFERRED_RANGES
 from driftwalk.model import Study, apply_overrides
 from driftwalk.simulation.backend import BROKEN
-from driftwalk.sweep import Store, WorkUnit, grid, settings_per_unit
+from driftwalk.sweep import Design, SweepStudy, WorkUnit, grid, settings_per_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 @dataclass(frozen=True, eq=False)
-class Nodes:
+class Nodes(SweepStudy["list[list[Record]]"]):
     """Runs at some values of the parameters; a work unit is a few nodes.
 
     Attributes
@@ -121,19 +120,19 @@ class Nodes:
         along = {name: column[name] for name in self.names if name in OF_EACH_RUN}
         return make_settings(worlds, world, first_trial=self.first_trial + rows.start, **along)
 
-    def simulate(self, store: Store | None = None, **how: Any) -> list[list[Record]]:
-        """Simulate all nodes, `how` as for `run_sweep`, skipping what a store holds already.
+    def design(self) -> Design:
+        """Return the numbers of the nodes."""
+        return grid(node=np.arange(len(self.value)))
 
-        Raises
-        ------
-        InputError
-            When the blocks of a run find no place in the tank, or no run of a node is sound.
-        """
+    @property
+    def unit_size(self) -> int:
+        """Number of nodes that are simulated and stored at once."""
         assembly = self.study.assembly
         steps = self.study.sensitivity.runs * assembly.duration_s / self.study.time_step_s
-        nodes = len(self.value)
-        units = grid(node=np.arange(nodes)).units(settings_per_unit(nodes, steps * assembly.blocks))
-        found = sweep_texts(self, units, store=store, **how)
+        return settings_per_unit(len(self.value), steps * assembly.blocks)
+
+    def result(self, found: Arrays) -> list[list[Record]]:
+        """Return the records of the runs of each node; refuse a node that broke down."""
         records = [records_from_text(text) for text in found["records"].tolist()]
         if not all(records):
             raise InputError("all runs of a node broke down: use a smaller time step")

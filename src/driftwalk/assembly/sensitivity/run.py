@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,11 +18,11 @@ from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
     Axes,
     Outcomes,
+    OutcomeStudy,
     Settings,
     make_axes,
     make_settings,
     place_first,
-    simulate_settings,
     world_plan,
 )
 from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
@@ -117,8 +118,8 @@ def sensitivity_map(
     settings = chosen.settings(flow, first_trial=FIRST_TRIALS.map, threads=each)
     if reference is None:
         reference = sensitivity_reference(chosen.study, flow, threads=threads, executor=executor)
-    outcomes = simulate_settings(settings, store=store, progress=progress, executor=executor)
-    return map_dataset(chosen, settings, outcomes, reference)
+    made = MapStudy(settings, chosen, reference)
+    return made.sweep(store=store, progress=progress, executor=executor)
 
 
 def sensitivity_reference(
@@ -167,9 +168,8 @@ def sensitivity_reference(
     >>> found.attrs["runs"], dict(found["realisation_count"].sizes)
     (6, {'realisation': 2, 'class': 2})
     """
-    settings = _reference_settings(study, flow, threads_of_unit(threads, executor))
-    outcomes = simulate_settings(settings, store=store, progress=progress, executor=executor)
-    return reference_dataset(settings.worlds[0], outcomes)
+    made = _reference_study(study, flow, threads_of_unit(threads, executor))
+    return made.sweep(store=store, progress=progress, executor=executor)
 
 
 def check_sensitivity(
@@ -205,14 +205,14 @@ def check_sensitivity(
     chosen = make_axes(study, axes)
     settings = chosen.settings(flow, first_trial=FIRST_TRIALS.map, threads=threads)
     place_first(settings)
-    place_first(_reference_settings(chosen.study, flow, threads))
+    _reference_study(chosen.study, flow, threads).check()
     return settings.size
 
 
-def _reference_settings(study: Study, flow: xr.Dataset, threads: int | None) -> Settings:
+def _reference_study(study: Study, flow: xr.Dataset, threads: int | None) -> ReferenceStudy:
     worlds = [world_plan(study, flow, threads=threads)]
     world = np.zeros(study.sensitivity.reference_realisations, dtype=np.int64)
-    return make_settings(worlds, world, first_trial=FIRST_TRIALS.reference)
+    return ReferenceStudy(make_settings(worlds, world, first_trial=FIRST_TRIALS.reference))
 
 
 NOT_COMMON: Final[dict[str, tuple[str, ...]]] = {
@@ -228,97 +228,108 @@ NOT_COMMON: Final[dict[str, tuple[str, ...]]] = {
 """Attributes that say nothing where an axis varies; of the other axes, the axis itself."""
 
 
-def reference_dataset(plan: Plan, outcomes: Outcomes) -> xr.Dataset:
-    """Return the `outcome_distribution` of all realisations, with that of each."""
-    assembly = plan.study.assembly
-    names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=plan.chirality)
-    count = outcomes.table(names)
-    runs = count.sum(axis=1)
-    if not runs.all():
-        raise InputError(
-            f"realisation {int(np.argmin(runs))} of the reference has no run with an outcome: all "
-            "broke down; use a smaller time step"
-        )
-    total = dict(zip(names, count.sum(axis=0).tolist(), strict=True))
-    courses, times = reference_courses(plan, outcomes.courses)
-    found = outcome_distribution(total, confidence=assembly.confidence)
-    found = found.assign_coords(times).assign(courses)
-    share = count / runs[:, None]
-    forces = plan.study.forces
-    found = found.assign(
-        realisation_count=(("realisation", "class"), count),
-        realisation_proportion=(("realisation", "class"), share),
-        standard_deviation=("class", share.std(axis=0, ddof=1)),
-    ).assign_attrs(
-        {
-            **{k: v for k, v in assembly_attrs(plan).items() if k not in ("trial", "runs")},
-            "left_out": int(outcomes.left_out.sum()),
-            "realisations": len(count),
-            "drag_coefficient": forces.drag_coefficient,
-            "force_std_N": forces.force_std_N,
-            "mean_pairwise_l1": pairwise_l1(list(share)).mean,
-            "expected_pairwise_l1": l1_noise_floor(found, assembly.runs, assembly.runs).mean,
-        }
-    )
-    return described(found)
+@dataclass(frozen=True, eq=False)
+class ReferenceStudy(OutcomeStudy):
+    """Realisations of one setting."""
 
-
-def map_dataset(
-    axes: Axes, settings: Settings, outcomes: Outcomes, reference: xr.Dataset
-) -> xr.Dataset:
-    """Return the `sensitivity` dataset of a map."""
-    names = _map_classes(settings, outcomes, reference)
-    count = outcomes.table(names)
-    runs = count.sum(axis=1)
-    with np.errstate(invalid="ignore"):
+    def dataset(self, outcomes: Outcomes) -> xr.Dataset:
+        """Return the `outcome_distribution` of all realisations, with that of each."""
+        plan = self.settings.worlds[0]
+        assembly = plan.study.assembly
+        names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=plan.chirality)
+        count = outcomes.table(names)
+        runs = count.sum(axis=1)
+        if not runs.all():
+            raise InputError(
+                f"realisation {int(np.argmin(runs))} of the reference has no run with an outcome: "
+                "all broke down; use a smaller time step"
+            )
+        total = dict(zip(names, count.sum(axis=0).tolist(), strict=True))
+        courses, times = reference_courses(plan, outcomes.courses)
+        found = outcome_distribution(total, confidence=assembly.confidence)
+        found = found.assign_coords(times).assign(courses)
         share = count / runs[:, None]
-        # Whole numbers first: shares that are rounded one by one do not add up to 1.
-        complete = count[:, is_complete(names)].sum(axis=1) / runs
-    known = reference.reindex({"class": list(names)}, fill_value=0.0)["proportion"].values
-    blocks = np.array([world.study.assembly.blocks for world in settings.worlds])[settings.world]
-    reference_runs = int(reference.attrs["runs"])
-    # Outcomes of other numbers of blocks have no class in common: there is nothing to compare.
-    same = blocks == int(reference.attrs["blocks"])
-    distance = np.abs(share - known).sum(axis=1)
-    in_floors = l1_in_floors(share, known, runs=runs, reference_runs=reference_runs)
-    floor = l1_noise_floor(reference, axes.study.sensitivity.runs, reference_runs)
-    dims = tuple(axes.values)
-    sizes = dict(zip(dims, axes.shape, strict=True))
-    courses, times = map_courses(settings.worlds[0], outcomes.courses, reference, dims=sizes)
-    of_setting: dict[str, npt.NDArray[Any]] = {
-        "runs": runs,
-        "left_out": outcomes.left_out,
-        "complete": complete,
-        "first_contact_median": outcomes.first_contact_median,
-        "completion_median": outcomes.completion_median,
-        "l1_distance": np.where(same, distance, np.nan),
-        "l1_in_floors": np.where(same, in_floors, np.nan),
-        "trial": settings.trial,
-    }
-    of_class = {"count": count, "proportion": share}
-    return build_dataset(
-        "sensitivity",
-        {
-            **{
-                name: ((*dims, "class"), values.reshape(*axes.shape, len(names)))
-                for name, values in of_class.items()
+        forces = plan.study.forces
+        found = found.assign(
+            realisation_count=(("realisation", "class"), count),
+            realisation_proportion=(("realisation", "class"), share),
+            standard_deviation=("class", share.std(axis=0, ddof=1)),
+        ).assign_attrs(
+            {
+                **{k: v for k, v in assembly_attrs(plan).items() if k not in ("trial", "runs")},
+                "left_out": int(outcomes.left_out.sum()),
+                "realisations": len(count),
+                "drag_coefficient": forces.drag_coefficient,
+                "force_std_N": forces.force_std_N,
+                "mean_pairwise_l1": pairwise_l1(list(share)).mean,
+                "expected_pairwise_l1": l1_noise_floor(found, assembly.runs, assembly.runs).mean,
+            }
+        )
+        return described(found)
+
+
+@dataclass(frozen=True, eq=False)
+class MapStudy(OutcomeStudy):
+    """The settings of a map, compared with a reference."""
+
+    axes: Axes
+    reference: xr.Dataset
+
+    def dataset(self, outcomes: Outcomes) -> xr.Dataset:
+        """Return the `sensitivity`."""
+        axes, settings, reference = self.axes, self.settings, self.reference
+        names = _map_classes(settings, outcomes, reference)
+        count = outcomes.table(names)
+        runs = count.sum(axis=1)
+        with np.errstate(invalid="ignore"):
+            share = count / runs[:, None]
+            # Whole numbers first: shares that are rounded one by one do not add up to 1.
+            complete = count[:, is_complete(names)].sum(axis=1) / runs
+        known = reference.reindex({"class": list(names)}, fill_value=0.0)["proportion"].values
+        blocks_of_world = np.array([world.study.assembly.blocks for world in settings.worlds])
+        reference_runs = int(reference.attrs["runs"])
+        # Outcomes of other numbers of blocks have no class in common: there is nothing to compare.
+        same = blocks_of_world[settings.world] == int(reference.attrs["blocks"])
+        distance = np.abs(share - known).sum(axis=1)
+        in_floors = l1_in_floors(share, known, runs=runs, reference_runs=reference_runs)
+        floor = l1_noise_floor(reference, axes.study.sensitivity.runs, reference_runs)
+        dims = tuple(axes.values)
+        sizes = dict(zip(dims, axes.shape, strict=True))
+        courses, times = map_courses(settings.worlds[0], outcomes.courses, reference, dims=sizes)
+        of_setting: dict[str, npt.NDArray[Any]] = {
+            "runs": runs,
+            "left_out": outcomes.left_out,
+            "complete": complete,
+            "first_contact_median": outcomes.first_contact_median,
+            "completion_median": outcomes.completion_median,
+            "l1_distance": np.where(same, distance, np.nan),
+            "l1_in_floors": np.where(same, in_floors, np.nan),
+            "trial": settings.trial,
+        }
+        of_class = {"count": count, "proportion": share}
+        return build_dataset(
+            "sensitivity",
+            {
+                **{
+                    name: ((*dims, "class"), values.reshape(*axes.shape, len(names)))
+                    for name, values in of_class.items()
+                },
+                **{name: (dims, values.reshape(axes.shape)) for name, values in of_setting.items()},
+                "reference": ("class", known),
+                **courses,
             },
-            **{name: (dims, values.reshape(axes.shape)) for name, values in of_setting.items()},
-            "reference": ("class", known),
-            **courses,
-        },
-        {
-            **axes.coordinates(),
-            "class": ("class", np.array(names, dtype=object)),
-            **times,
-        },
-        {
-            **_common_attrs(axes, settings.worlds[0]),
-            **_reference_attrs(reference),
-            "noise_floor_mean": floor.mean,
-            "noise_floor_95": floor.quantile,
-        },
-    )
+            {
+                **axes.coordinates(),
+                "class": ("class", np.array(names, dtype=object)),
+                **times,
+            },
+            {
+                **_common_attrs(axes, settings.worlds[0]),
+                **_reference_attrs(reference),
+                "noise_floor_mean": floor.mean,
+                "noise_floor_95": floor.quantile,
+            },
+        )
 
 
 def _map_classes(settings: Settings, outcomes: Outcomes, reference: xr.Dataset) -> tuple[str, ...]:

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import json
 import math
+from abc import abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -24,22 +23,13 @@ from driftwalk.assembly.runs.plan import Plan, make_plan, simulate_rows, stream_
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, courses_to_text
 from driftwalk.core.arrays import Floats, Integers, Keys
-from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError
-from driftwalk.core.files.shards import Arrays, Unit, UnitT
-from driftwalk.core.progress import Progress
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.files.shards import Arrays
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
 from driftwalk.model.sensitivity import AXES
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.simulation.series import flow_starts
-from driftwalk.sweep import (
-    MemoryStore,
-    Store,
-    SweepError,
-    WorkUnit,
-    grid,
-    run_sweep,
-    settings_per_unit,
-)
+from driftwalk.sweep import Design, SweepStudy, WorkUnit, grid, settings_per_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -165,49 +155,68 @@ def world_plan(study: Study, flow: xr.Dataset, *, threads: int | None) -> Plan:
     )
 
 
-def simulate_settings(
-    settings: Settings,
-    *,
-    store: Store | None = None,
-    progress: Progress | None = None,
-    executor: Executor | None = None,
-) -> Outcomes:
-    """Simulate all settings, skipping what a store holds already.
+@dataclass(frozen=True, eq=False)
+class OutcomeStudy(SweepStudy["xr.Dataset"]):
+    """The outcomes of settings of self-assembly, and a dataset of them."""
 
-    Raises
-    ------
-    InputError
-        When the blocks of a run find no place in the tank.
-    """
-    longest = max(w.index.size * w.steps * w.study.assembly.blocks for w in settings.worlds)
-    design = grid(setting=np.arange(settings.size))
-    units = design.units(settings_per_unit(settings.size, longest))
-    function = partial(_compute, settings)
-    found = sweep_texts(function, units, store=store, progress=progress, executor=executor)
-    return Outcomes(
-        [json.loads(text) for text in found["count"]],
-        found["left_out"],
-        found["first_contact_median"],
-        found["completion_median"],
-        found["courses"].tolist(),
-    )
+    settings: Settings
 
+    def check(self) -> None:
+        """Refuse blocks that find no place in the tank."""
+        place_first(self.settings)
 
-def sweep_texts(
-    function: Callable[[WorkUnit], Arrays],
-    units: Sequence[WorkUnit],
-    *,
-    store: Store | None,
-    **how: Any,
-) -> Arrays:
-    """Run a sweep whose results hold texts; a mistake in the study is raised as it is."""
-    try:
-        return run_sweep(function, units, store=TextStore(store or MemoryStore()), **how)
-    except SweepError as error:
-        # The user's mistake, whichever setting shows it.
-        if isinstance(error.__cause__, DriftwalkError):
-            raise error.__cause__ from None
-        raise
+    def design(self) -> Design:
+        """Return the numbers of the settings."""
+        return grid(setting=np.arange(self.settings.size))
+
+    @property
+    def unit_size(self) -> int:
+        """Number of settings that are simulated and stored at once."""
+        worlds = self.settings.worlds
+        longest = max(w.index.size * w.steps * w.study.assembly.blocks for w in worlds)
+        return settings_per_unit(self.settings.size, longest)
+
+    def __call__(self, unit: WorkUnit) -> Arrays:
+        """Simulate the settings of a unit, with those of one world side by side."""
+        rows = np.arange(unit.start, unit.stop)
+        tally = {int(row): _Tally() for row in rows}
+        for world in dict.fromkeys(self.settings.world[rows].tolist()):
+            plan = self.settings.worlds[world]
+            same = rows[self.settings.world[rows] == world].tolist()
+            most = BLOCKS_AT_ONCE // plan.study.assembly.blocks
+            for pieces in _calls(same, plan.index.size, most):
+                found, classes = simulate_pieces(plan, self.settings, pieces)
+                begin = 0
+                for piece in pieces:
+                    part = slice(begin, begin + len(piece.runs))
+                    mine = {name: values[part] for name, values in found.items()}
+                    tally[piece.setting].add(mine, classes, plan)
+                    begin = part.stop
+        step, tallies = self.settings.worlds[0].study.time_step_s, tally.values()
+        texts = [courses_to_text(added(one.courses)) for one in tallies]
+        return {
+            "count": np.array([json.dumps(one.count) for one in tallies], dtype=object),
+            "left_out": np.array([one.left_out for one in tallies]),
+            "first_contact_median": np.array([_median(t.first_contact, step) for t in tallies]),
+            "completion_median": np.array([_median(t.completion, step) for t in tallies]),
+            "courses": np.array(texts, dtype=object),
+        }
+
+    def result(self, found: Arrays) -> xr.Dataset:
+        """Return the dataset of what the work units gave."""
+        return self.dataset(
+            Outcomes(
+                [json.loads(text) for text in found["count"]],
+                found["left_out"],
+                found["first_contact_median"],
+                found["completion_median"],
+                found["courses"].tolist(),
+            )
+        )
+
+    @abstractmethod
+    def dataset(self, outcomes: Outcomes) -> xr.Dataset:
+        """Return the dataset of the study."""
 
 
 def place_first(settings: Settings) -> None:
@@ -245,32 +254,6 @@ class _Tally:
         self.courses.append(courses_of(step, became, classes, plan))
         self.first_contact.append(found["first_contact_step"][sound])
         self.completion.append(completion_step(found)[sound])
-
-
-def _compute(settings: Settings, unit: WorkUnit) -> Arrays:
-    """Simulate the settings of a unit, those of one world side by side."""
-    rows = np.arange(unit.start, unit.stop)
-    tally = {int(row): _Tally() for row in rows}
-    for world in dict.fromkeys(settings.world[rows].tolist()):
-        plan = settings.worlds[world]
-        same = rows[settings.world[rows] == world].tolist()
-        for pieces in _calls(same, plan.index.size, BLOCKS_AT_ONCE // plan.study.assembly.blocks):
-            found, classes = simulate_pieces(plan, settings, pieces)
-            begin = 0
-            for piece in pieces:
-                part = slice(begin, begin + len(piece.runs))
-                mine = {name: values[part] for name, values in found.items()}
-                tally[piece.setting].add(mine, classes, plan)
-                begin = part.stop
-    time_step, tallies = settings.worlds[0].study.time_step_s, tally.values()
-    texts = [courses_to_text(added(one.courses)) for one in tallies]
-    return {
-        "count": np.array([json.dumps(one.count) for one in tallies], dtype=object),
-        "left_out": np.array([one.left_out for one in tallies]),
-        "first_contact_median": np.array([_median(t.first_contact, time_step) for t in tallies]),
-        "completion_median": np.array([_median(t.completion, time_step) for t in tallies]),
-        "courses": np.array(texts, dtype=object),
-    }
 
 
 class Piece(NamedTuple):
@@ -338,32 +321,6 @@ def _median(steps: list[Integers], time_step: float) -> float:
     if not 0 < half <= happened.size:
         return float("nan")
     return float(times_of(happened[half - 1], time_step=time_step))
-
-
-class TextStore:
-    """A store that keeps text too: class names differ from unit to unit, in number and length."""
-
-    def __init__(self, inner: Store) -> None:
-        self._inner = inner
-
-    def missing(self, units: Iterable[UnitT]) -> list[UnitT]:
-        """Return the units that have no result yet."""
-        return self._inner.missing(units)
-
-    def write(self, unit: Unit, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
-        """Keep what a unit gave, text as arrays of bytes."""
-        encoded = {
-            name: np.char.encode(values.astype(str)) if values.dtype == object else values
-            for name, values in arrays.items()
-        }
-        self._inner.write(unit, encoded)
-
-    def read(self, unit: Unit) -> Arrays:
-        """Return what was kept for a unit."""
-        return {
-            name: np.char.decode(values).astype(object) if values.dtype.kind == "S" else values
-            for name, values in self._inner.read(unit).items()
-        }
 
 
 KEYS: Final = {name: ASSEMBLY_KEYS.get(name, "") for name in AXES}

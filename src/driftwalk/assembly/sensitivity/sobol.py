@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, Final
 
@@ -23,10 +24,9 @@ from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
     KEYS,
     Outcomes,
+    OutcomeStudy,
     Settings,
     make_settings,
-    place_first,
-    simulate_settings,
     world_plan,
 )
 from driftwalk.core.arrays import Floats
@@ -344,10 +344,8 @@ def sensitivity_indices(
     >>> found["output"].values.tolist(), found["input"].values.tolist()
     (['complete', '2', '1+1'], ['drag_coefficient', 'force_std'])
     """
-    design = _design(study, samples, bounds)
-    settings = _settings(study, flow, design, threads_of_unit(threads, executor))
-    outcomes = simulate_settings(settings, store=store, progress=progress, executor=executor)
-    return _indices(study, design, outcomes)
+    made = _indices_study(study, flow, samples, bounds, threads_of_unit(threads, executor))
+    return made.sweep(store=store, progress=progress, executor=executor)
 
 
 def check_indices(
@@ -381,13 +379,80 @@ def check_indices(
     >>> dw.assembly.check_indices(dw.Study(), dw.uniform_flow(0.0, 0.0), samples=8)
     32
     """
-    settings = _settings(study, flow, _design(study, samples, bounds), threads)
-    if study.sensitivity.runs < 2:
-        raise InputError(
-            "Sobol' indices need at least 2 runs of each setting, got 1 (`sensitivity.runs`)"
+    made = _indices_study(study, flow, samples, bounds, threads)
+    made.check()
+    return made.settings.size
+
+
+@dataclass(frozen=True, eq=False)
+class IndicesStudy(OutcomeStudy):
+    """The settings of a Sobol' design."""
+
+    study: Study
+    inputs: xr.Dataset
+
+    def check(self) -> None:
+        """Refuse single runs, of which no variance is known, and blocks that find no place."""
+        if self.study.sensitivity.runs < 2:
+            raise InputError(
+                "Sobol' indices need at least 2 runs of each setting, got 1 (`sensitivity.runs`)"
+            )
+        super().check()
+
+    def dataset(self, outcomes: Outcomes) -> xr.Dataset:
+        """Return the `sobol_indices`."""
+        import xarray as xr
+
+        study, inputs = self.study, self.inputs
+        assembly = study.assembly
+        names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=chirality_of(study))
+        count = outcomes.table(names)
+        runs = count.sum(axis=1)
+        short = np.flatnonzero(runs < 2)
+        if short.size:
+            raise InputError(
+                f"setting {int(short[0])} of the Sobol' design has {int(runs[short[0]])} runs with "
+                "an outcome, at least 2 are needed; use more runs (`sensitivity.runs`) or a "
+                "smaller time step"
+            )
+        share = count / runs[:, None]
+        complete = share[:, is_complete(names)].sum(axis=1)
+        # Sums of shares may exceed one by a hair.
+        table = np.minimum(np.column_stack([complete, share]), 1.0)
+        outputs = xr.DataArray(
+            table,
+            dims=("setting", "output"),
+            coords={"output": np.array(["complete", *names], dtype=object)},
         )
-    place_first(settings)
-    return settings.size
+        noise = sampling_variance(table, runs[:, None])
+        found = sobol_indices(inputs, outputs, noise_variance=noise, seed=inputs.attrs["seed"])
+        facts: dict[str, Any] = {
+            "runs": study.sensitivity.runs,
+            "left_out": int(outcomes.left_out.sum()),
+            "blocks": assembly.blocks,
+            "study": study.to_toml(),
+            # As the axes of a map have them.
+            "input_units": " ".join(
+                str(KINDS["sensitivity"].variable(str(name)).units)
+                for name in inputs["input"].values
+            ),
+        }
+        return described(
+            found.assign(
+                proportion=outputs, value=inputs["value"], low=inputs["low"], high=inputs["high"]
+            ).assign_attrs(facts)
+        )
+
+
+def _indices_study(
+    study: Study,
+    flow: xr.Dataset,
+    samples: int,
+    bounds: Mapping[str, tuple[float, float]] | None,
+    threads: int | None,
+) -> IndicesStudy:
+    inputs = _design(study, samples, bounds)
+    return IndicesStudy(_settings(study, flow, inputs, threads), study, inputs)
 
 
 def _design(
@@ -432,45 +497,3 @@ def _settings(study: Study, flow: xr.Dataset, design: xr.Dataset, threads: int |
         ]
     worlds = [world_plan(one, flow, threads=threads) for one in studies]
     return make_settings(worlds, world, first_trial=FIRST_TRIALS.sobol, **column)
-
-
-def _indices(study: Study, design: xr.Dataset, outcomes: Outcomes) -> xr.Dataset:
-    import xarray as xr
-
-    assembly = study.assembly
-    names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=chirality_of(study))
-    count = outcomes.table(names)
-    runs = count.sum(axis=1)
-    short = np.flatnonzero(runs < 2)
-    if short.size:
-        raise InputError(
-            f"setting {int(short[0])} of the Sobol' design has {int(runs[short[0]])} runs with an "
-            "outcome, at least 2 are needed; use more runs (`sensitivity.runs`) or a "
-            "smaller time step"
-        )
-    share = count / runs[:, None]
-    complete = share[:, is_complete(names)].sum(axis=1)
-    # Sums of shares may exceed one by a hair.
-    table = np.minimum(np.column_stack([complete, share]), 1.0)
-    outputs = xr.DataArray(
-        table,
-        dims=("setting", "output"),
-        coords={"output": np.array(["complete", *names], dtype=object)},
-    )
-    noise = sampling_variance(table, runs[:, None])
-    found = sobol_indices(design, outputs, noise_variance=noise, seed=design.attrs["seed"])
-    facts: dict[str, Any] = {
-        "runs": study.sensitivity.runs,
-        "left_out": int(outcomes.left_out.sum()),
-        "blocks": assembly.blocks,
-        "study": study.to_toml(),
-        # As the axes of a map have them.
-        "input_units": " ".join(
-            str(KINDS["sensitivity"].variable(str(name)).units) for name in design["input"].values
-        ),
-    }
-    return described(
-        found.assign(
-            proportion=outputs, value=design["value"], low=design["low"], high=design["high"]
-        ).assign_attrs(facts)
-    )

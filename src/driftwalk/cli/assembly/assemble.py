@@ -21,7 +21,7 @@ def assemble(
     run: Run = None,
     flow: FlowFile = None,
     earlier: Path | None = optional(
-        "--from RUN",
+        "--earlier-fit RUN",
         "Fit of glued blocks, or of free blocks in one recording: drag of hidden faces, shared "
         "stirring.",
     ),

@@ -250,8 +250,10 @@ def with_glued(given: StudyOptions, folder: Path | None) -> tuple[StudyOptions, 
     try:
         quantiles = interaction_quantiles(found)
     except InputError as error:
-        how = "driftwalk fit DIMER --body-shape xx --from FIT, driftwalk fit PAIR --interaction"
-        raise InputError(f"{folder}: {error} ({how})") from None
+        raise InputError(
+            f"{folder}: {error} (driftwalk fit DIMER --body-shape xx --earlier-fit FIT, driftwalk "
+            "fit PAIR --interaction)"
+        ) from None
     values, said = {}, []
     for name, key in GLUED.items():
         if key in quantiles:
