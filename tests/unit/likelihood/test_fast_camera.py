@@ -7,45 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fit_worlds import coarse_study
+from fast_camera import CONTACT, LEAP, SAMPLES, filmed_fast, point_of
 from scipy.stats import multivariate_normal
 
 from driftwalk.core.arrays import Floats
-from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.filter_pass import Passes, log_densities, whitened
-from driftwalk.likelihood.filter.parameters import Point, body_of
-from driftwalk.likelihood.filter.series import FILTER, series_of
-from driftwalk.likelihood.spline import lay_spline
-from driftwalk.schema import Track
-
-SAMPLES, LEAP, CONTACT = 300, 120, 200
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.series import FILTER
 
 
 @pytest.fixture(scope="module")
 def passes() -> Passes:
-    """Three seconds at 100 Hz of a block on a bent path, with a leap and a contact."""
-    study = coarse_study()
-    time = 0.01 * np.arange(SAMPLES)
-    noise = np.random.default_rng(1)
-    x = 0.06 * np.cos(0.9 * time) + 2e-4 * noise.normal(size=SAMPLES)
-    y = 0.06 * np.sin(0.7 * time) + 2e-4 * noise.normal(size=SAMPLES)
-    x[LEAP] += 0.03
-    theta = 0.8 * time + 8e-3 * noise.normal(size=SAMPLES)
-    (series,) = series_of([Track(time, x, y, theta)], study, "state")
-    excluded = series.excluded.copy()
-    excluded[CONTACT] = 1
-    spline = lay_spline(outline_of(study.tank.to_arena()), side=0.03, spacing=0.05)
-    return Passes([replace(series, excluded=excluded)], body_of(study, "state"), spline)
+    return filmed_fast()
 
 
 @pytest.fixture(scope="module")
 def point(passes: Passes) -> Point:
-    flow = np.random.default_rng(2).normal(
-        0.0, 0.02, (2, passes.spline.rows, passes.spline.columns)
-    )
-    return Point(
-        flow, math.log(0.5), math.log(2e-3), math.log(2.5e-4), math.log(3e-3), math.log(0.01)
-    )
+    return point_of(passes)
 
 
 def covariances(lower: Floats) -> Floats:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from fast_camera import filmed_fast, point_of
 from fit_worlds import coarse_study, recording
 
 from driftwalk.core.arrays import Floats
@@ -126,13 +129,13 @@ class Dense:
 
     def __init__(self, estimate: Estimate, errors: Sequence[Innovations]) -> None:
         point, size = estimate.point, estimate.point.coefficients.size
-        half = size // 2
         rows, white = [], []
         for one in errors:
             flow = one.series.flow
             kernel = estimate.passes.kernel(one.series, point.in_flow(flow), sensitivities=True)
             found = kernel.run(one.series.time.size)
             own = np.zeros((len(found["jacobian"]), size + 1))
+            half = found["jacobian"].shape[1] - 1
             own[:, half * flow : half * (flow + 1)] = found["jacobian"][:, :-1]
             own[:, -1] = found["jacobian"][:, -1]
             rows.append(own)
@@ -186,6 +189,32 @@ def test_sums_over_parts_of_the_samples_are_those_of_all(
         leverage.covariance, dense.covariance, rtol=1e-6, atol=1e-9 * dense.covariance.max()
     )
     assert leverage.parameters == pytest.approx(np.trace(dense.data @ dense.covariance))
+
+
+def test_of_a_fast_camera_sums_are_those_of_means_over_a_tenth_of_a_second() -> None:
+    """Sums of the errors are exact; derivatives within ten samples differ by some percents."""
+    passes = filmed_fast()
+    fast: Any = SimpleNamespace(
+        passes=passes, point=point_of(passes), prior=Prior(passes), weights=Weights(0.7, 2e4)
+    )
+    errors = innovations_of(fast)
+    group = np.where(errors[0].used[:, None], np.arange(300)[:, None] // 100, -1)
+    groups = [np.repeat(group, 3, axis=1)]
+    one, flow = Contrast(groups, 3), Contrast(groups, 3, by="flow")
+    leverage = collect(fast, errors, [one, flow], lags=2)
+    dense = Dense(fast, errors)
+    for contrast, close in ((one, 1e-9), (flow, 0.1)):
+        weight = dense.weights[contrast.by]
+        matrix = np.array([(groups[0].ravel() == k) * weight for k in range(3)])
+        size = np.sqrt((matrix**2).sum(axis=1))
+        assert np.abs((contrast.score - matrix @ dense.white) / size).max() < 3.0 * close
+        np.testing.assert_allclose(contrast.power, size**2, rtol=close)
+        wanted = matrix @ dense.jacobian
+        assert np.abs(contrast.slope - wanted).max() < max(close, 1e-3) * np.abs(wanted).max()
+    # The part with all samples is as exact as that of a slow camera.
+    assert leverage.parameters == pytest.approx(np.trace(dense.data @ dense.covariance), rel=0.02)
+    std = np.sqrt(np.diag(dense.covariance))
+    assert np.sqrt(np.diag(leverage.covariance)) == pytest.approx(std, rel=0.02)
 
 
 def test_what_fitting_puts_in_at_each_lag_is_the_mean_of_its_matrix(
