@@ -196,6 +196,28 @@ def test_numbers_of_departures_have_even_intervals() -> None:
     )
 
 
+def test_the_force_of_each_flow_has_the_error_of_its_own_q() -> None:
+    """What is common to all flows, as the error of the mass, counts in each."""
+    contrasts = {"flow_intensity_1": math.log(4.0), "flow_intensity_2": -0.6}
+    point = replace(POINT, coefficients=np.zeros((3, 2, 2, 2)), opened=contrasts)
+    covariance = covariance_of(point, 5)
+    study = study_with(fit__mass_std_kg=0.0005)
+    facts = parameter_facts(point, covariance, study)
+    first = facts["force_std_N"]
+    assert facts["flow_force_std_N"] == pytest.approx([first, 2.0 * first, first * math.exp(-0.3)])
+    inertia = 0.0005 / study.block.mass_kg
+    for flow in range(3):
+        name = f"flow_intensity_{flow}"
+
+        def log(one: Point, name: str = name) -> float:
+            return 0.5 * (one.log_intensity + one.opened.get(name, 0.0))
+
+        reach = Z * math.hypot(std_of(point, covariance, log), inertia)
+        value = facts["flow_force_std_N"][flow]
+        ends = [facts[f"flow_force_std_{end}_N"][flow] for end in ("low", "high")]
+        assert ends == pytest.approx([value * math.exp(-reach), value * math.exp(reach)], rel=1e-5)
+
+
 @pytest.mark.parametrize("oriented", [True, False])
 def test_c_d_has_the_error_of_its_own_criterion(oriented: bool) -> None:
     """Correlations stay, and each standard deviation has its calibrated factor."""
