@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import driftwalk as dw
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood import measured_series
+from driftwalk.likelihood.filter.parameters import Amplitudes
 from driftwalk.likelihood.measured_flow import (
     MeasuredFlow,
     _farthest,
@@ -155,6 +157,18 @@ def test_a_measured_flow_is_stored_and_said() -> None:
     np.testing.assert_array_equal(data["measured_u_error"][1], flow.error[0])
     assert set(coords) == {"measured_y", "measured_x"}
     assert words["measured_flow"] == "piv.nc"
+
+
+def test_modes_are_stored_by_their_number() -> None:
+    flow = flow_of(3)
+    known = Amplitudes(np.arange(4.0), np.ones((2, 4)), "mirror")
+    data, _, words = replace(flow, amplitudes=known).stored()
+    for k, name in enumerate("uv"):
+        for end, values in (("", flow.velocity), ("_error", flow.error)):
+            dims, found = data[f"measured_{name}_mode{end}"]
+            assert dims == ("flow_mode", "measured_y", "measured_x")
+            np.testing.assert_array_equal(found, values[[2 + k, 4 + k]])
+    assert words["mode_repeat"] == "mirror"
 
 
 def test_where_two_flows_are_farthest_apart_is_a_measured_node() -> None:

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from driftwalk.calibration.held_out.recorded import Scales, recorded_ranges, scales_of
+from driftwalk.calibration.held_out.recorded import (
+    RecordedMotion,
+    Scales,
+    recorded_ranges,
+    scales_of,
+)
+from driftwalk.comparison import KsReference
+from driftwalk.comparison.aspects import points_distance
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Parameter, Track
 
@@ -59,6 +69,25 @@ def test_a_slow_recording_has_a_range_of_speeds_all_the_same() -> None:
     short = Scales(speed=0.1, fastest=0.05, interval=0.2, duration=40.0, size=0.3)
     (found,) = recorded_ranges([Parameter("a", "rad/s", **WIDE)], short)  # type: ignore[arg-type]
     assert found.low == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("std", [0.0, 0.004])
+def test_an_uncertain_clearance_moves_the_place_near_the_wall(std: float) -> None:
+    """By two of its standard errors, inwards or outwards, whichever is farther from itself."""
+    wall = np.random.default_rng(1).uniform([0.0, -1.0], [0.05, 1.0], (300, 2))
+    some: Any = SimpleNamespace(
+        held_aspects=[SimpleNamespace(name="steps"), SimpleNamespace(name="wall", points=wall)],
+        clearance=SimpleNamespace(std=std),
+    )
+    found = RecordedMotion.clearance_distance.func(some)  # type: ignore[attr-defined]
+    reference = KsReference(wall)
+    moved = [
+        points_distance(reference, wall + np.array([sign * 2.0 * std, 0.0])) for sign in (1, -1)
+    ]
+    assert found == pytest.approx(max(moved))
+    assert (found > 0.1) is (std > 0.0)
+    none: Any = SimpleNamespace(held_aspects=[SimpleNamespace(name="steps")])
+    assert RecordedMotion.clearance_distance.func(none) == 0.0  # type: ignore[attr-defined]
 
 
 def test_scales_are_those_of_the_track() -> None:
