@@ -5,14 +5,17 @@ arithmetic or boolean operator, a loop's end. The rooms are likelihood, calibrat
 assembly/outcomes. Sites are drawn in a seeded random order, one mutant each, so every prefix of the
 results is a fair sample. Annotations and decorators are left out.
 
-Which tests run a line is read from one run of the fast tests under coverage (``contexts.py``). A
-mutant meets the fast tests that run its line, cheapest first, until one fails; then the other fast
-tests of the same files, whose fixtures may have run it. A mutant on a line that no test runs
-survives. Results go to ``fast.jsonl``, one line a mutant; run again, it continues.
+Which tests run a line is read from one run of the tests under coverage (``contexts.py``). A mutant
+meets the fast tests that run its line, cheapest first, until one fails; then the other fast tests
+of the same files, whose fixtures may have run it. A mutant on a line that no test runs survives.
+Results go to ``fast.jsonl``, one line a mutant; run again, it continues. With ``--slow`` the
+survivors meet the slow tests, in ``whole.jsonl``.
 
     pip install cosmic-ray coverage
-    MAP=/tmp/map.json PYTHONPATH=studies/mutation python -m pytest -p contexts tests/unit
-    python studies/mutation/mutate.py --map /tmp/map.json --mutants 360
+    MAP=/tmp/fast.json PYTHONPATH=studies/mutation python -m pytest -p contexts tests/unit
+    python studies/mutation/mutate.py --map /tmp/fast.json --mutants 150
+    MAP=/tmp/slow.json PYTHONPATH=studies/mutation python -m pytest -p contexts -m slow tests/unit
+    python studies/mutation/mutate.py --map /tmp/fast.json /tmp/slow.json --mutants 150 --slow
 """
 
 from __future__ import annotations
@@ -33,10 +36,14 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 ROOMS = ("likelihood", "calibration", "comparison", "assembly/outcomes")
 LEFT_OUT = {"RemoveDecorator", "VariableReplacer", "VariableInserter"}
-SEED = 20261127
-LIMIT = 60.0  # processor time of one group of fast tests [s]; a run past it counts as killed
-SLOW_LIMIT = 240.0  # of slow tests, which may be left out beyond it [s]
+SEED = 20261130
+LIMIT = 60.0  # processor time of one group of tests [s]; a run past it, and three times its usual
+# time, counts as killed
+SLOW_LIMIT = 120.0  # of slow tests, which are left out beyond it [s]
 EXACT = "tests/reference/test_pinned_numbers.py"  # its tests name the lines that they run
+# Loaded once, before the processes of the mutants fork; none of these loads a room.
+LOADED = ("scipy.stats", "scipy.optimize", "scipy.signal", "h5py", "pandas", "xarray")
+LOADED += ("driftwalk.model", "driftwalk.flow", "driftwalk.simulation")
 Place = tuple[tuple[int, int], tuple[int, int]]
 
 
@@ -80,7 +87,7 @@ def mutants_of(path: Path) -> Iterator[Mutant]:
                 yield Mutant(str(path.relative_to(ROOT)), (start, end), name, number)
 
 
-def sample(number: int) -> list[Mutant]:
+def sample(number: int, seed: int = SEED) -> list[Mutant]:
     """Return mutants of different sites in the study's random order."""
     sites: dict[tuple[str, Any], list[Mutant]] = {}
     for room in ROOMS:
@@ -88,7 +95,7 @@ def sample(number: int) -> list[Mutant]:
             for mutant in mutants_of(path):
                 sites.setdefault((mutant.file, mutant.place[0]), []).append(mutant)
     print(f"{len(sites)} sites, {sum(map(len, sites.values()))} mutants", flush=True)
-    draw = random.Random(SEED)
+    draw = random.Random(seed)
     order = sorted(sites)
     draw.shuffle(order)
     return [draw.choice(sites[site]) for site in order[:number]]
@@ -113,7 +120,7 @@ def changed_line(mutant: Mutant, code: str) -> str:
     return next((b.strip() for a, b in zip(before, code.splitlines(), strict=False) if a != b), "")
 
 
-def run_tests(tests: list[str], file: str, code: str, limit: float = LIMIT) -> str:
+def run_tests(tests: list[str], file: str, code: str, limit: float) -> str:
     """Run tests on the changed file in a forked process: `killed`, `survived` or `timeout`."""
     child = os.fork()
     if child == 0:
@@ -151,67 +158,104 @@ def processor_time(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def judge(mutant: Mutant, known: dict[str, Any]) -> Any:
-    """Return what the fast tests say about a mutant, and the slow ones where those say nothing."""
+class Known(NamedTuple):
+    """What is known of the tests."""
+
+    lines: dict[str, dict[str, list[str]]]
+    """Tests that run each line, by file and number; "" where it is run at import."""
+    cost: dict[str, float]
+    """Processor time of each test that passes [s]."""
+    slow: set[str]
+
+    def seeing(self, mutant: Mutant) -> tuple[set[str], set[str]]:
+        """Return the tests that run the line of a mutant, and the others of their files."""
+        lines = self.lines.get(mutant.file, {})
+        seen = set(lines.get(str(mutant.place[0][0]), []))
+        if "" in seen:  # run at import: any test of the file may see it
+            seen = {test for tests in lines.values() for test in tests}
+        seen &= set(self.cost)
+        files = {test.split("::")[0] for test in seen} - {EXACT}
+        return seen, {test for test in self.cost if test.split("::")[0] in files} - seen
+
+
+def known_of(maps: list[Path]) -> Known:
+    """Return what one or several runs of ``contexts.py`` say."""
+    known = Known({}, {}, set())
+    for one in maps:
+        found = json.loads(one.read_text(encoding="utf-8"))
+        known.cost.update(found["cost"])
+        known.slow.update(found["slow"])
+        for file, lines in found["tests"].items():
+            own = known.lines.setdefault(file, {})
+            for line, tests in lines.items():
+                own[line] = [*own.get(line, []), *tests]
+    return known
+
+
+def judge(mutant: Mutant, known: Known, *, slow: bool) -> dict[str, Any]:
+    """Return what the fast tests say about a mutant, or the slow ones."""
     code = mutated(mutant)
-    found = {"line": changed_line(mutant, code), "fast": "survived", "slow": "", "tests": 0}
+    found: dict[str, Any] = {"line": changed_line(mutant, code)}
+    kind = "slow" if slow else "fast"
     try:
         ast.parse(code)
     except SyntaxError:
-        return {**found, "fast": "invalid"}
-    cost, slow = known["cost"], set(known["slow"])
-    lines = known["tests"].get(mutant.file, {})
-    seen = set(lines.get(str(mutant.place[0][0]), []))
-    if "" in seen:  # run at import: any test of the file may see it
-        seen = {test for tests in lines.values() for test in tests}
-    seen &= set(cost)
-    files = {test.split("::")[0] for test in seen} - {EXACT}
-    others = {test for test in cost if test.split("::")[0] in files} - seen
-    for group in (seen - slow, others - slow):
-        ordered = sorted(group, key=lambda test: cost[test])
-        if ordered and found["fast"] == "survived":
-            found["tests"] += len(ordered)
-            found["fast"] = run_tests(ordered, mutant.file, code)
-    if found["fast"] == "survived":
-        left, chosen = SLOW_LIMIT, []
-        for test in sorted((seen | others) & slow, key=lambda test: (test in others, cost[test])):
-            left -= cost[test]
-            if left > 0.0:
+        return {**found, kind: "invalid", "tests": 0}
+    seen, others = known.seeing(mutant)
+    found |= {kind: "survived", "tests": 0}
+    left = SLOW_LIMIT if slow else float("inf")
+    for group in (seen, others):
+        chosen = []
+        for test in sorted(group, key=known.cost.__getitem__):
+            if (test in known.slow) == slow and known.cost[test] < left:
+                left -= known.cost[test]
                 chosen.append(test)
-        slowly = run_tests(chosen, mutant.file, code, 3.0 * SLOW_LIMIT) if chosen else "survived"
-        found |= {"slow": slowly, "slow_tests": len(chosen)}
+        if chosen and found[kind] == "survived":
+            found["tests"] += len(chosen)
+            usual = sum(known.cost[test] for test in chosen)
+            found[kind] = run_tests(chosen, mutant.file, code, max(LIMIT, 3.0 * usual))
     return found
+
+
+def entries_of(path: Path) -> dict[int, dict[str, Any]]:
+    """Return the results that a file holds, by number; the last of each counts."""
+    lines = path.read_text("utf-8").splitlines() if path.exists() else []
+    return {entry["number"]: entry for entry in map(json.loads, lines)}
 
 
 def main() -> None:
     """Run the mutants that the results do not hold yet."""
     parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("--map", type=Path, required=True, help="JSON of contexts.py")
-    parser.add_argument("--mutants", type=int, default=360)
+    parser.add_argument("--map", type=Path, nargs="+", required=True, help="JSON of contexts.py")
+    parser.add_argument("--mutants", type=int, default=150)
+    parser.add_argument("--seed", type=int, default=SEED, help="of the sample")
     parser.add_argument("--output", type=Path, default=HERE / "fast.jsonl")
     parser.add_argument("--again", action="store_true", help="only the survivors of the output")
+    parser.add_argument("--slow", action="store_true", help="its survivors meet the slow tests")
+    parser.add_argument("--whole", type=Path, default=HERE / "whole.jsonl", help="what they say")
     parser.add_argument("--part", type=int, nargs=2, default=(0, 1), help="K of N, side by side")
     chosen = parser.parse_args()
     os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
-    for module in ("numpy", "scipy.stats", "scipy.optimize", "scipy.signal", "h5py", "pandas"):
+    for module in LOADED:
         try:
-            __import__(module)  # loaded once, before the processes of the mutants fork
+            __import__(module)
         except ImportError:
             print(f"without {module}", file=sys.stderr)
     os.chdir(ROOT)
-    found = json.loads(chosen.map.read_text(encoding="utf-8"))
-    lines = chosen.output.read_text("utf-8").splitlines() if chosen.output.exists() else []
-    known = {entry["number"]: entry for entry in map(json.loads, lines)}
-    for number, mutant in enumerate(sample(chosen.mutants)):
-        before = known.get(number)
-        if before is not None and (not chosen.again or before["fast"] != "survived"):
+    known, fast = known_of(chosen.map), entries_of(chosen.output)
+    survivors = {number for number, entry in fast.items() if entry["fast"] == "survived"}
+    output, done = chosen.output, set(fast) - (survivors if chosen.again else set())
+    if chosen.slow:
+        output, done = chosen.whole, set(entries_of(chosen.whole))
+    for number, mutant in enumerate(sample(chosen.mutants, chosen.seed)):
+        if number in done or number % chosen.part[1] != chosen.part[0]:
             continue
-        if number % chosen.part[1] != chosen.part[0]:
+        if (chosen.slow or chosen.again) and number not in survivors:
             continue
         entry = {"number": number, "file": mutant.file, "at": list(mutant.place[0])}
         entry |= {"operator": mutant.operator.split("/")[-1]}
-        entry |= judge(mutant, found)
-        with chosen.output.open("a", encoding="utf-8") as stream:
+        entry |= judge(mutant, known, slow=chosen.slow)
+        with output.open("a", encoding="utf-8") as stream:
             stream.write(json.dumps(entry) + "\n")
 
 

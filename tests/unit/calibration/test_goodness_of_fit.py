@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,3 +58,26 @@ def test_the_margin_is_that_of_the_triangle_inequality():
     )
     other = dataclasses.replace(whole, reference=moved)
     assert could_be_best(whole, coarse, other).tolist() == [[True, True, True, True]]
+
+
+def test_the_margin_is_twice_the_distance_and_two_floors(monkeypatch: pytest.MonkeyPatch):
+    """Of a half 0.05 from the whole, with a floor of 0.02: 0.14 above the nearest setting."""
+    from driftwalk.calibration import goodness_of_fit
+
+    asked = []
+
+    def floor_at(part: Any, point: tuple[float, ...]) -> float:
+        asked.append(point)
+        return 0.02
+
+    monkeypatch.setattr(goodness_of_fit, "noise_floor_at", floor_at)
+    statistic = SimpleNamespace(matrix=lambda *_, threads: np.array([[0.05]]))
+    whole: Any = SimpleNamespace(
+        statistic=statistic,
+        reference=SimpleNamespace(table=None),
+        like=SimpleNamespace(threads=1),
+    )
+    distance = 0.3 + np.array([[0.139, 0.0, 0.141]])[..., None]
+    coarse = full_map((np.array([0.4]), np.array([0.0, 3e-4, 6e-4])), distance, {})
+    assert could_be_best(whole, coarse, whole).tolist() == [[True, True, False]]
+    assert asked == [(0.4, 3e-4)]

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import driftwalk as dw
 from driftwalk.calibration.problem import Problem, prepare_problem
-from driftwalk.calibration.stationarity import STATIONARITY, stationarity_of
+from driftwalk.calibration.stationarity import (
+    STATIONARITY,
+    stationarity_of,
+    stationarity_of_motion,
+    unsteady_motion,
+)
 from driftwalk.comparison.ks import ks_distance
 from driftwalk.conditions import load_with_study, recorded_camera
 from driftwalk.schema import Track, body_track
@@ -63,6 +70,43 @@ def test_a_short_recording_says_nothing() -> None:
     short = problem_of(walk(np.full(STATIONARITY.fewest_pairs, 2e-3), 1))
     assert len(short.steps) < STATIONARITY.fewest_pairs
     assert stationarity_of(short) is None
+
+
+def motion_of(speed: np.ndarray, *, interval: float, duration: float) -> Any:
+    """Return a recording whose steps have these speeds [m/s], evenly spread over a duration."""
+    turn = np.random.default_rng(2).normal(0.0, 0.3, speed.size)
+    time = duration * (np.arange(speed.size) + 0.5) / speed.size
+    steps = SimpleNamespace(points=np.column_stack([speed * interval, turn]), time=time)
+    plan = SimpleNamespace(short=SimpleNamespace(step_interval=interval))
+    return SimpleNamespace(steps=steps, plan=plan, duration=duration)
+
+
+def test_when_the_speed_changed_is_said() -> None:
+    """From 8 to 5 mm/s after 0.45 of 200 s; the speeds scatter by a tenth.
+
+    A mean of 450 such speeds is off by 0.05 mm/s, so that a split next to the right one wins by
+    chance in no seed.
+    """
+    random = np.random.default_rng(1)
+    speed = np.where(np.arange(1000) < 450, 8e-3, 5e-3) * random.normal(1.0, 0.1, 1000)
+    motion = motion_of(speed, interval=0.2, duration=200.0)
+    (said,) = unsteady_motion(motion)
+    found = stationarity_of_motion(motion)
+    assert found is not None
+    assert said.startswith(str(found.warning))
+    first, last = (1e3 * part.mean() for part in (speed[:450], speed[450:]))
+    assert said.endswith(
+        f"; the mean speed changed most at 90 s, from {first:.3g} to {last:.3g} mm/s"
+    )
+    half = motion.steps.points[:500], motion.steps.points[500:]
+    assert found.distance == pytest.approx(ks_distance(*half))
+
+
+def test_nothing_is_said_of_a_steady_or_a_short_recording() -> None:
+    speed = 8e-3 * np.random.default_rng(3).normal(1.0, 0.1, 1000)
+    assert unsteady_motion(motion_of(speed, interval=0.2, duration=200.0)) == []
+    changed = np.where(np.arange(199) < 100, 8e-3, 2e-3)
+    assert unsteady_motion(motion_of(changed, interval=0.2, duration=40.0)) == []
 
 
 @pytest.mark.slow

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +14,9 @@ from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood import newton
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Body
+from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.fit import fit_motion
-from driftwalk.likelihood.newton import EXCERPT, pieces
+from driftwalk.likelihood.newton import EXCERPT, beginning, pieces, thinned
 from driftwalk.likelihood.preparation import series_of
 from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
@@ -102,3 +105,65 @@ def test_a_search_by_way_of_pieces_ends_where_one_of_the_whole_does(
     # The lever may be known from its prior alone, and the added mass is stated.
     found_out = ~np.isin(whole["parameter"].values, ["force_lever", "added_mass_share"])
     assert (apart < 0.3 * width)[found_out].all()
+
+
+def of_samples(*sizes: int, interval: float = 0.1, flows: int = 1) -> Any:
+    """Return recordings of so many samples; the x of a sample is its number, y its recording."""
+    series = []
+    for number, size in enumerate(sizes):
+        index = np.arange(float(size))
+        left_out = np.zeros(size, dtype=np.uint8)
+        series.append(
+            Series(
+                interval * index, index, 0.0 * index + number, index, index, left_out, angle=index
+            )
+        )
+    return SimpleNamespace(series=series, flows=flows)
+
+
+def spans(found: Any) -> list[tuple[int, int, int]]:
+    """Return recording, first sample and the sample after the last of each series."""
+    return [(int(one.y[0]), int(one.x[0]), int(one.x[-1]) + 1) for one in found]
+
+
+def test_each_recording_gives_pieces_in_proportion_to_its_length() -> None:
+    """Of 30,000 samples 3600 in pieces of 300: one in 2500 samples, one at least."""
+    few = pieces(of_samples(250, 20_000, 301, 1000, 10_000, 300))
+    assert few is not None
+    found = spans(few)
+    # What is as short as a piece is one; the middle of a longer one, if it gives one alone.
+    assert found[0] == (0, 0, 250)
+    assert (2, 0, 300) in found
+    assert (3, 350, 650) in found
+    assert found[-1] == (5, 0, 300)
+    for recording, size, count in ((1, 20_000, 8), (4, 10_000, 4)):
+        own = [one for one in found if one[0] == recording]
+        assert len(own) == count
+        first, end = np.array([one[1:] for one in own]).T
+        assert (end - first == EXCERPT.piece_samples).all()
+        assert (first[0], end[-1]) == (0, size)
+        assert np.ptp(np.diff(first)) <= 1
+    assert len(found) == 16
+
+
+@pytest.mark.parametrize(("samples", "some"), [(8999, False), (9000, True)])
+def test_pieces_are_worth_their_search_where_they_are_two_fifths(samples: int, some: bool) -> None:
+    assert (pieces(of_samples(samples)) is not None) == some
+
+
+def test_laws_are_compared_on_the_first_three_thousand_samples() -> None:
+    assert spans(beginning(of_samples(2000, 700, 2000, 500))) == [
+        (0, 0, 2000), (1, 0, 700), (2, 0, 300)
+    ]  # fmt: skip
+    # A little more than that is not cut, and flows are told from each other by all samples.
+    for whole in (of_samples(1800, 1800), of_samples(4000, 4000, flows=2)):
+        assert beginning(whole) is whole.series
+
+
+def test_a_fast_camera_is_thinned_and_a_slow_one_is_left_as_it_is() -> None:
+    passes = _passes(60.0)
+    assert thinned(passes) is passes
+    fast = replace(passes, series=of_samples(100, interval=0.02).series)
+    (thin,) = thinned(fast).series
+    np.testing.assert_array_equal(thin.x, np.arange(0, 100, 5))
+    assert thinned(fast).body is passes.body

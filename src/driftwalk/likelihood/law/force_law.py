@@ -207,10 +207,10 @@ def number_facts(point: Point, covariance: Floats, study: Study) -> dict[str, An
         width = math.hypot(widths.get("linear_share", 0.0), share * float(reach[0]))
         # Of the whole block for a share of 1, K b of all strips: four faces, b a quarter of the
         # speed at which linear and quadratic drag are compared, a side a second.
-        side, width = study.block.side_m, study.block.side_m
+        side = face = study.block.side_m
         if study.block.shape != "square":
-            width = 0.25 * float(study.body().panels[:, 4].sum())
-        area = width * study.wetted_depth_m
+            face = 0.25 * float(study.body().panels[:, 4].sum())
+        area = face * study.wetted_depth_m
         drag = 0.5 * study.water.density_kg_m3 * math.exp(point.log_drag) * area * side
         state("linear_drag_kg_s", share, width, drag * inertia_of(study, point).share)
     if "strength_trend" in widths:

@@ -61,3 +61,24 @@ def test_the_variance_is_that_of_the_law() -> None:
     assert synthetic_likelihood_at(law, np.zeros(4), SETTING, 2).log_variance == pytest.approx(
         wanted, abs=0.4
     )
+
+
+def test_it_is_the_mahalanobis_distance_of_the_simulations() -> None:
+    """In the correlations of numpy, a twentieth of which is taken away, and their deviations."""
+    mixed = np.random.default_rng(6).normal(size=(4, 4))
+
+    def simulate(settings: np.ndarray) -> np.ndarray:
+        return np.random.default_rng(5).normal(size=(len(settings), 4)) @ mixed + SPREAD
+
+    recorded = np.array([0.3, -1.0, 4.0, 0.2])
+    found = synthetic_likelihood_at(simulate, recorded, SETTING, 7)
+    seen = simulate(np.zeros((SYNTHETIC.simulations + 7, 2)))
+    known, others = seen[:-7], seen[-7:]
+    correlation = 0.95 * np.corrcoef(known.T) + 0.05 * np.eye(4)
+    std = known.std(axis=0, ddof=1)
+    covariance = correlation * np.outer(std, std)
+    off = np.vstack([recorded, others]) - known.mean(axis=0)
+    wanted = [one @ np.linalg.solve(covariance, one) for one in off]
+    assert found.discrepancy == pytest.approx(wanted[0], rel=1e-9)
+    assert found.own_discrepancies == pytest.approx(wanted[1:], rel=1e-9)
+    assert found.log_variance == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)

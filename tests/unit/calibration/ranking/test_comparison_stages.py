@@ -63,3 +63,39 @@ def test_a_walk_that_the_distances_do_not_reject_is_asked_where_a_model_gives_th
         Stages, "_matched", lambda *_: Evidence(Discrepancy(discrepancy, 90.0, 140.0), 0.0)
     )
     assert list(Stages(work, 20, in_memory, None, lambda *_: None).evidence(judged)) == wanted
+
+
+@pytest.mark.parametrize(
+    ("executor", "threaded", "wanted"),
+    [("far", True, "far"), ("far", False, "far"), (None, True, "pool"), (None, False, None)],
+)
+def test_summaries_are_matched_where_a_model_may_be_simulated(
+    executor: Any, threaded: bool, wanted: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A user's own model is asked by one thread alone; the progress goes with the root."""
+    told: list[tuple[float, float, str]] = []
+    asked: dict[str, Any] = {}
+
+    def estimate(entry: Any, motion: Any, answer: Any, **how: Any) -> str:
+        asked.update(how)
+        how["tell"](25, 100)
+        return "evidence"
+
+    monkeypatch.setattr(compare, "estimate_evidence", estimate)
+    monkeypatch.setattr(compare, "runs_in_threads", lambda _: threaded)
+    monkeypatch.setattr(compare, "most_settings", lambda *_: 4)
+    entries = [SimpleNamespace(model=SimpleNamespace(name="own"), ranges=(), baseline=False)]
+    work: Any = SimpleNamespace(
+        entries=entries, motion=None, fingerprint=lambda: {"seed": 1}, costs=lambda: [1]
+    )
+    kept: list[tuple[str, dict[str, Any]]] = []
+    pool: Any = "pool"
+    made = Stages(work, 20, lambda *what: kept.append(what), executor, lambda *_: None, pool=pool)
+    staged = SimpleNamespace(stage=lambda _: lambda *what: told.append(what))
+    monkeypatch.setattr(Stages, "staged_progress", staged)
+    assert made._matched(2, 0, np.array([0.25]), 3) == "evidence"  # type: ignore[comparison-overlap]
+    assert asked["executor"] == wanted
+    ((name, fingerprint),) = kept
+    assert name == "summaries-2"
+    assert fingerprint == {"seed": 1, "asked": 0, "answer": [0.25], "worlds": 20}
+    assert told == [(2.5, 3, "summaries of own")]

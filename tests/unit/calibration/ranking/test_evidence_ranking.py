@@ -8,14 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from driftwalk.calibration.estimation.synthetic_likelihood import SyntheticLikelihood
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore, without_error
 from driftwalk.calibration.held_out.law_findings import Discrepancy
+from driftwalk.calibration.ranking import model_evidence
 from driftwalk.calibration.ranking.model_evidence import (
     EVIDENCE,
     Evidence,
     EvidenceRanking,
     Shortlist,
+    estimate_evidence,
+    most_settings,
     rank_by_evidence,
     ranking_sentence,
     shortlist_models,
@@ -126,3 +130,93 @@ def test_the_sentence_says_whom_and_why() -> None:
         "No model reproduces the summaries of the motion: the discrepancies are nine 812, three "
         "211, in the models' own recordings below 140"
     )
+
+
+class Asked:
+    """Estimates an evidence from a search and a likelihood that are made up."""
+
+    own = np.linspace(90.0, 140.0, 101)
+
+    def __init__(self, patch: pytest.MonkeyPatch, discrepancy: float) -> None:
+        self.recorded = np.array([[1.0, 2.0]])
+        self.done = 0
+        self.worlds = SimpleNamespace(simulated=self.simulated)
+        self.at: list[np.ndarray] = []
+        self.most = 0
+        best = SimpleNamespace(setting=np.array([-0.2, 0.3, 1.4]), log_volume=-9.0)
+        patch.setattr(model_evidence, "even_blocks", lambda *_: "even")
+        patch.setattr(model_evidence, "SummaryObjective", self.made)
+        patch.setattr(model_evidence, "label_order", lambda _: None)
+        patch.setattr(
+            model_evidence, "find_optima", lambda *_, **__: [SimpleNamespace(solution=best)]
+        )
+
+        def likelihood(simulate: Any, recorded: Any, setting: Any, replicates: int) -> Any:
+            assert recorded.tolist() == [1.0, 2.0]
+            assert replicates == 20
+            self.at.append(setting)
+            self.blurred = simulate(np.zeros((400, len(setting))))
+            return SyntheticLikelihood(discrepancy, self.own, 12.5)
+
+        patch.setattr(model_evidence, "synthetic_likelihood_at", likelihood)
+        patch.setattr(model_evidence, "score_setting", lambda worlds, motion, at: ("score", at))
+        patch.setattr(model_evidence, "bout_distances", lambda motion, worlds: worlds)
+
+    def made(self, *_: Any, **named: Any) -> Asked:
+        self.most = named["most"]
+        return self
+
+    def __call__(self, settings: np.ndarray, *, parts: int = 1) -> np.ndarray:
+        return np.full((len(settings), parts, 2), 5.0)
+
+    def simulated(self, settings: np.ndarray, replicates: int, *, stage: str) -> Any:
+        return (settings.tolist(), replicates, stage)
+
+    def evidence_of(self, entry: Candidate) -> Evidence:
+        motion: Any = SimpleNamespace(replicates=20, seed=3)
+        nothing: Any = None
+        return estimate_evidence(
+            entry, motion, np.array([0.5]), executor=None, store=None, tell=nothing
+        )
+
+
+def test_the_evidence_is_laplace_s_integral_over_even_ranges(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """-2 log of exp(-d / 2) / sqrt(det S) times the volume (2 pi)^(p / 2) sqrt(det C)."""
+    asked = Asked(monkeypatch, 120.0)
+    found = asked.evidence_of(entry(3))
+    root = np.exp(0.5 * -9.0)
+    integral = np.exp(-60.0) / np.exp(0.5 * 12.5) * (2.0 * np.pi) ** 1.5 * root
+    assert found.deviance == pytest.approx(-2.0 * np.log(integral))
+    assert found.discrepancy == Discrepancy(120.0, 115.0, pytest.approx(137.5))
+    # The likelihood is that of the best setting within the ranges, and so are worlds and score.
+    (setting,) = asked.at
+    assert setting == pytest.approx([0.0, 0.3, 1.0])
+    assert found.matched is not None
+    assert found.matched[1] == pytest.approx([0.0, 0.3, 1.0])  # type: ignore[misc]
+    assert found.bouts[0] == [pytest.approx([0.0, 0.3, 1.0])]
+    assert asked.most == most_settings(3, 20)
+    # Summaries get a noise of their own; 800 numbers tell its spread to 2.5 %.
+    assert (asked.blurred - 5.0).std() == pytest.approx(EVIDENCE.blur, rel=0.125)
+
+
+def test_a_model_that_is_clearly_wrong_is_not_judged_further(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = Asked(monkeypatch, 900.0).evidence_of(entry(3))
+    assert found.discrepancy.against
+    assert found.matched is None
+    walk = Asked(monkeypatch, 100.0)
+    found = walk.evidence_of(entry(3, baseline=True))
+    assert found.matched is None
+    # Without parameters there is nothing to search and nothing to integrate over.
+    assert walk.at[0].size == 0
+    assert found.deviance == pytest.approx(112.5)
+
+
+def test_a_model_without_numbers_is_simulated_at_one_setting() -> None:
+    one, none = most_settings(1, 20), most_settings(0, 20)
+    assert most_settings(0, 50) - none == 30
+    assert most_settings(1, 50) - one == 30
+    assert one > none > 0

@@ -51,6 +51,19 @@ def test_stated_laws(stated: dict[str, Any], force: str, drag: str, kind: str) -
     assert facts["drag_law"] == kind
 
 
+@pytest.mark.parametrize("unsettled", [(), ("one", "two")])
+@pytest.mark.parametrize("settled_by", [7.5, np.inf])
+def test_a_law_that_is_not_settled_says_why(unsettled: tuple[str, ...], settled_by: float) -> None:
+    """Evidence over no other law is not a number of it."""
+    assumptions = assumptions_of(Study(), "state", recordings=1, flows=1)
+    mode = cast(Mode, SimpleNamespace(point=Point(np.zeros((2, 1, 1)), 0.0, 0.0, 0.0)))
+    law = LawResult(mode, mode, True, {}, settled_by, None, unsettled=unsettled)
+    facts = law_facts(law, assumptions)
+    assert facts["force_law"] == "floating body"
+    assert facts.get("law_unsettled") == ("one; two" if unsettled else None)
+    assert facts.get("law_settled_by") == (7.5 if np.isfinite(settled_by) else None)
+
+
 @pytest.mark.slow
 def test_a_fit_keeps_it() -> None:
     fit = fitted(120.0)

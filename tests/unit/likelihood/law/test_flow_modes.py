@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from driftwalk.likelihood.fitted_modes import mode_variables, moving_fields, sto
 from driftwalk.likelihood.law import flow_modes
 from driftwalk.likelihood.law.flow_modes import modes_at
 from driftwalk.likelihood.law.shape_changes import ShapeChange
-from driftwalk.likelihood.newton import ModeSearch
+from driftwalk.likelihood.newton import Mode, ModeSearch
 from driftwalk.likelihood.preparation import prepare
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.spline import lay_spline
@@ -167,6 +168,117 @@ def test_modes_of_two_recordings_are_refused() -> None:
     study = apply_overrides(coarse_study(), {"fit.flow_modes": "auto"})
     with pytest.raises(InputError, match="one recording in one flow"):
         dw.likelihood.check_fit([recording(60.0), recording(60.0, "second")], study)
+
+
+class Tried:
+    """Searches of modes whose evidences and deviances are stated; None where one breaks down."""
+
+    def __init__(
+        self, patch: pytest.MonkeyPatch, steady: float, one: float | None, both: float | None
+    ) -> None:
+        self.begun: list[tuple[int, Any, float]] = []
+        self.ends: dict[int, float | None] = {2: one, 3: both}
+        patch.setattr(flow_modes, "evidence_of", lambda mode, _: mode.deviance)
+        patch.setattr(flow_modes, "with_layers", lambda search, layers: self.of(layers))
+        self.steady = self.mode(np.full((2, 1, 3), 0.1), {}, steady)
+        self.search: Any = SearchOf()
+
+    def mode(self, coefficients: Any, opened: dict[str, float], evidence: float) -> Mode:
+        at = Point(coefficients, -0.7, -9.0, -8.0, opened=opened)
+        return Mode(at, Weights(1.0, 2.0), np.eye(1), 1, 1, True, evidence)
+
+    def of(self, layers: int) -> Any:
+        def find(point: Any, weights: Weights, *, held: Any) -> Mode | None:
+            self.begun.append((layers, point, weights.modes))
+            end = self.ends[layers]
+            if end is None:
+                return None
+            opened = {**point.opened}
+            moved = point.coefficients.copy()
+            if layers == 3:
+                # An ellipse whose larger axis is 4 at 30 degrees.
+                first, second = np.array([1.0, 2.0, 2.0]), np.array([2.0, -1.0, 0.0])
+                axis = np.deg2rad(30.0)
+                moved[1, 0] = 4.0 / 3.0 * math.cos(axis) * first - 0.1 * math.sin(axis) * second
+                moved[2, 0] = 4.0 / 3.0 * math.sin(axis) * first + 0.1 * math.cos(axis) * second
+            return self.mode(moved, opened, end)
+
+        return SimpleNamespace(prior=None, coarse=lambda: SimpleNamespace(find=find))
+
+    def found(self, wanted: Any, *candidates: float) -> Any:
+        found = ShapeChange(candidates[0], 1e-40, 12.0, 100.0, candidates)
+        return modes_at(self.search, self.steady, found, wanted)
+
+
+@dataclass(frozen=True)
+class SearchOf:
+    prior: Any = None
+    iterations: int = 30
+
+
+@pytest.mark.parametrize(
+    ("one", "both", "wanted", "layers"),
+    [
+        (20.0, 22.9, "auto", 2),  # two modes need more evidence than one
+        (20.0, 23.1, "auto", 3),
+        (None, 23.1, "auto", 3),
+        (12.9, 12.9, "auto", 1),  # and any of them more than a steady flow
+        (13.1, 13.1, "auto", 2),
+        (0.0, 0.0, "2", 3),
+        (0.0, 0.0, "1", 2),
+        (None, 40.0, "1", 1),
+        (40.0, None, "auto", 1),
+    ],
+)
+def test_modes_are_taken_by_their_evidence(
+    monkeypatch: pytest.MonkeyPatch, one: float | None, both: float | None, wanted: Any, layers: int
+) -> None:
+    tried = Tried(monkeypatch, 10.0, one, both)
+    found = tried.found(wanted, 0.05)
+    assert found.layers == layers
+    assert (found.start is None) == (layers == 1)
+    assert bool(found.unsettled) == (layers == 1)
+    number, point, weakness = tried.begun[0]
+    assert number == 3
+    assert point.opened == {"mode_frequency": 0.05}
+    assert weakness == flow_modes.FLOW_MODES.weakness
+    np.testing.assert_array_equal(point.coefficients[0], tried.steady.point.coefficients)
+    assert not point.coefficients[1:].any()
+    if layers > 1:
+        names = {"mode_frequency"} if layers == 3 else {"mode_frequency", "mode_phase"}
+        assert set(found.opened) == names
+
+
+def test_one_mode_begins_with_the_larger_axis_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    """u cos(wt) + v sin(wt) along one axis at 30 degrees is 4 cos(wt - 30 degrees) of its shape."""
+    tried = Tried(monkeypatch, 10.0, 40.0, 40.0)
+    tried.found("auto", 0.05)
+    number, point, _ = tried.begun[1]
+    assert number == 2
+    shape = point.coefficients[1, 0].ravel()
+    phase = point.opened["mode_phase"]
+    size = 4.0 / 3.0 * np.array([1.0, 2.0, 2.0])
+    for turned in (0.0, 1.0, 2.5):
+        wanted = size * math.cos(turned - math.radians(30.0))
+        assert shape * math.cos(turned + phase) == pytest.approx(wanted)
+
+
+def test_of_several_lines_the_one_that_comes_nearest_is_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    deviances = {0.1: 30.0, 0.2: 20.0, 0.3: None}
+    monkeypatch.setattr(
+        flow_modes,
+        "_both",
+        lambda search, steady, one: (
+            None if deviances[one] is None else SimpleNamespace(deviance=deviances[one])
+        ),
+    )
+    nothing: Any = None
+    assert flow_modes._best_of(SearchOf(), nothing, (0.1, 0.2, 0.3)) == 0.2  # type: ignore[arg-type]
+    assert flow_modes._best_of(SearchOf(), nothing, (0.3, 0.3)) is None  # type: ignore[arg-type]
+    assert flow_modes._best_of(SearchOf(), nothing, (0.3,)) == 0.3  # type: ignore[arg-type]
+    assert flow_modes._best_of(SearchOf(), nothing, ()) is None  # type: ignore[arg-type]
 
 
 @pytest.mark.slow

@@ -9,7 +9,12 @@ import pytest
 
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.law.score_tests import Scores, ScoreTests
-from driftwalk.likelihood.law.shape_changes import ShapeChange, find_shape_change, shape_facts
+from driftwalk.likelihood.law.shape_changes import (
+    ShapeChange,
+    _highest,
+    find_shape_change,
+    shape_facts,
+)
 
 COUNT, SIDE = 6000, 0.03
 TIME = 0.1 * np.arange(COUNT)
@@ -91,3 +96,37 @@ def test_a_short_recording_has_no_spectrum() -> None:
     series = wandering(1).part(0, 100)
     part = Scores(*(values[:100] for values in scores(1, NONE)))
     assert find_shape_change([series], [part], side=SIDE) is None
+
+
+def test_a_flow_that_turns_has_its_line_in_the_errors_alone() -> None:
+    """Its frequency is one of the candidates; the strength itself has no line."""
+    series = wandering(5)
+    turning = scores(5, NONE)
+    turning.errors[:, 0] += alternating(series, 0.4, 12.5)
+    found = find_shape_change([series], [turning], side=SIDE)
+    assert found is not None
+    assert found.significant
+    assert math.isnan(found.frequency)
+    assert min(abs(one - 0.08) for one in found.candidates) < 2e-4
+    assert 2 <= len(found.candidates) <= 4
+    assert "with a period" not in found.sentence
+    assert "slowly" not in found.sentence
+
+
+def test_of_two_recordings_the_surer_line_counts() -> None:
+    """And chance has twice as many lines to choose from."""
+    steady, series = wandering(1), wandering(7)
+    change = alternating(series, 0.25, 10.0)
+    alone = find_shape_change([series], [scores(7, change)], side=SIDE)
+    both = find_shape_change([steady, series], [scores(1, NONE), scores(7, change)], side=SIDE)
+    assert alone is not None
+    assert both is not None
+    assert both.frequency == alone.frequency
+    assert both.p_value == pytest.approx(2.0 * alone.p_value)
+
+
+def test_lines_are_higher_than_their_neighbours() -> None:
+    power = np.array([9.0, 1.0, 5.0, 4.0, 7.0, 8.0, 3.0, 3.0, 6.0, 2.0, 9.5])
+    assert _highest(power) == [5, 8]
+    assert _highest(np.array([1.0, 4.0, 4.0, 2.0])) == [2]
+    assert _highest(np.arange(5.0)) == []
