@@ -640,10 +640,12 @@ def cells_of(entries: Sequence[Entry]) -> list[str]:
     errors = np.array([one.error for one in entries])
     there = [one for one in entries if np.isfinite(one.width)]
     held = sum(one.held for one in there)
-    std = errors.std(ddof=1) / np.sqrt(errors.size) if errors.size > 1 else np.inf
+    bias = f"{100 * errors.mean():+.1f}"
+    if errors.size > 1:
+        bias += f" ± {100 * errors.std(ddof=1) / np.sqrt(errors.size):.1f}"
     return [
         f"{100 * np.median(np.abs(np.expm1(errors))):.1f} %",
-        f"{100 * errors.mean():+.1f} ± {100 * std:.1f} %",
+        f"{bias} %",
         f"{held} of {len(there)} ({chance_of(held, len(there))})",
         f"{100 * np.median([one.width for one in there]):.1f} %",
         f"{np.mean([one.score for one in there]):.3f}",
