@@ -305,7 +305,6 @@ def test_a_stored_fit_gives_the_filter_its_numbers_back() -> None:
 
 
 def test_a_body_is_that_of_its_study() -> None:
-    from driftwalk.likelihood.filter.parameters import Body
 
     study = study_with()
     found = Body(study, "given")
