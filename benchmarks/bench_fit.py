@@ -26,6 +26,7 @@ from timing import machine
 
 import driftwalk as dw
 from driftwalk.likelihood import check_model, fit
+from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.model import apply_overrides
 from driftwalk.schema import build_trajectory
 
@@ -33,7 +34,13 @@ AIM = {10.0: "10 s", 100.0: "20 s, 500 MB"}
 TOLERANCE = 0.2
 CAMERA = {"observation.position_noise_m": 3e-4, "observation.orientation_noise_rad": 0.00873}
 SETTLING_S = 20.0
-STAGES = ("prepare", "_laws_of", "restricted_drag", "angle_given_facts")
+STAGES: dict[str, tuple[Any, str]] = {
+    "prepare": (fit, "prepare"),
+    "laws": (LawSearch, "find"),
+    "restricted": (fit, "restricted_drag"),
+    "angle": (fit, "angle_given_facts"),
+}
+"""From a stage to where its function stands."""
 
 
 def recording(rate: float, minutes: float) -> Any:
@@ -47,16 +54,15 @@ def recording(rate: float, minutes: float) -> Any:
     return build_trajectory(clock, *pose, attrs={"source": "simulated", "simulated": "yes"})
 
 
-def timed(name: str, taken: dict[str, float]) -> Callable[..., Any]:
+def timed(stage: str, call: Callable[..., Any], taken: dict[str, float]) -> Callable[..., Any]:
     """A function of the fit that adds its processor time."""
-    call = getattr(fit, name)
 
     def found(*args: Any, **options: Any) -> Any:
         begin = time.process_time()
         try:
             return call(*args, **options)
         finally:
-            taken[name] = taken.get(name, 0.0) + time.process_time() - begin
+            taken[stage] += time.process_time() - begin
 
     return found
 
@@ -64,15 +70,15 @@ def timed(name: str, taken: dict[str, float]) -> Callable[..., Any]:
 def bench(rate: float, minutes: float) -> None:
     """Fit and check one recording, and print a row."""
     seen, taken = recording(rate, minutes), dict.fromkeys(STAGES, 0.0)
-    for name in STAGES:
-        setattr(fit, name, timed(name, taken))
+    for stage, (place, name) in STAGES.items():
+        setattr(place, name, timed(stage, getattr(place, name), taken))
     begin = time.process_time()
     found = fit.fit_motion(seen)
     middle = time.process_time()
     checked = check_model(found, [seen])
     end = time.process_time()
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    parts = " ".join(f"{taken[name]:>10.1f}" for name in STAGES)
+    parts = " ".join(f"{one:>10.1f}" for one in taken.values())
     print(
         f"{rate:>7g} {middle - begin:>8.1f} {parts} {end - middle:>8.1f} {end - begin:>8.1f} "
         f"{memory:>9.0f}  {AIM.get(rate, '')}; {checked['verdict'].item()}",
@@ -99,7 +105,7 @@ def main() -> None:
         return
     print(machine())
     print(f"Processor time [s] of {options.minutes:g} minutes on one thread; memory [MB].")
-    stages = " ".join(f"{name.strip('_').split('_')[0]:>10}" for name in STAGES)
+    stages = " ".join(f"{stage:>10}" for stage in STAGES)
     print(
         f"{'Hz':>7} {'fit':>8} {stages} {'check':>8} {'both':>8} {'memory':>9}  aim; verdict",
         flush=True,

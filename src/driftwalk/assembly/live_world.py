@@ -11,7 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.lattice.joined_faces import CLOSING, JOINING, PARTING, face_table
+from driftwalk.assembly.lattice.joined_faces import (
+    CLOSING,
+    JOINING,
+    PARTING,
+    FaceTable,
+    face_table,
+)
 from driftwalk.assembly.lattice.replayed_worlds import DiscWorld, SquareWorld
 from driftwalk.assembly.outcomes.outcome_classes import state_class
 from driftwalk.assembly.pull.force_tables import block_pull
@@ -43,13 +49,20 @@ class LiveEvent(NamedTuple):
 
 
 class _Moment:
-    """The state of a world at one time, for those who read; its outcome is named when asked for."""
+    """The state of a world at one time; what is not read of it costs nothing."""
 
     def __init__(self, world: _core.LiveWorld, study: Study) -> None:
         self.state: dict[str, npt.NDArray[Any]] = world.state()
-        self.time = float(times_of(np.array(world.step), time_step=study.time_step_s))
-        self.table = face_table(study.assembly)
+        self._step = world.step
         self._study = study
+
+    @cached_property
+    def time(self) -> float:
+        return float(times_of(np.array(self._step), time_step=self._study.time_step_s))
+
+    @cached_property
+    def table(self) -> FaceTable | None:
+        return face_table(self._study.assembly)
 
     @cached_property
     def outcome(self) -> str:
@@ -425,10 +438,12 @@ class LiveTank:
         """Take time steps, fewer where there are too many events, and note these."""
         study = self._active.study
         state = self._world.state()
+        found = self._world.advance(steps)
+        if not found["step"].size:
+            return
         blocks, chirality = len(state["assembly"]), study.assembly.chirality
         world = SquareWorld(blocks, chirality) if self.has_lattice else DiscWorld(blocks)
         world.begin(state)
-        found = self._world.advance(steps)
         pose = self._world.state()["pose"]
         times = times_of(found["step"], time_step=study.time_step_s).tolist()
         kinds, pairs, faces = (found[name].tolist() for name in ("kind", "block", "face"))

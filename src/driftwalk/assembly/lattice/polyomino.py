@@ -167,6 +167,7 @@ def shape_order(name: str) -> tuple[int, int, str, str]:
     return shape_size(name), name.count("/"), merged, own
 
 
+@lru_cache(maxsize=1 << 16)
 def shape_size(name: str) -> int:
     """Return the number of cells of a shape, or of discs of a contact graph."""
     return discs_of(name) or counts_of_shape(name)[0] or NAMED_SHAPES.get(name, name).count("x")

@@ -33,7 +33,6 @@ from driftwalk.assembly.lattice.polyomino import (
     name_of,
     orientations,
     polyomino_cells,
-    polyomino_name,
     polyominoes,
     require_chirality,
     shape_order,
@@ -277,14 +276,17 @@ def world_class(
     cells, labels = np.asarray(cell), np.asarray(assembly)
     if labels.size > MOST_NAMED:
         return counted_class(np.unique(labels).size)
-    if labels.ndim != 1 or cells.shape != (labels.size, 2):
+    if labels.ndim != 1 or cells.shape != (labels.size, 2) or cells.dtype.kind not in "iu":
         raise InputError(
-            f"a world has cells (blocks, 2) and assemblies (blocks,), got {cells.shape} and "
-            f"{labels.shape}"
+            "a world has whole cells (blocks, 2) and assemblies (blocks,), got "
+            f"{cells.dtype} {cells.shape} and {labels.shape}"
         )
-    return class_name(
-        polyomino_name(cells[labels == label], chirality=chirality) for label in np.unique(labels)
-    )
+    require_chirality(chirality)
+    members: dict[int, list[Cell]] = {}
+    for label, (column, row) in zip(labels.tolist(), cells.tolist(), strict=True):
+        members.setdefault(label, []).append((column, row))
+    # In plain numbers: a live tank of 64 blocks is named in every frame.
+    return class_name(name_of(moved_to_origin(tuple(own)), chirality) for own in members.values())
 
 
 def sort_classes(names: Iterable[str]) -> tuple[str, ...]:
