@@ -7,8 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
+from fit_worlds import coarse_study
 
-from driftwalk.likelihood.angle_consistency import _vorticity, negated, spin_correlation
+from driftwalk.core.errors import InputError
+from driftwalk.likelihood.angle_consistency import _vorticity, spin_correlation
+from driftwalk.likelihood.check import run
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.spline import Spline
 from driftwalk.schema import build_trajectory
@@ -68,8 +72,23 @@ def test_a_spin_with_the_water_has_the_correlation_1(sign: float) -> None:
     assert spin_correlation(still, passes) == 0.0
 
 
-def test_negated_orientations_are_counted_the_other_way_round() -> None:
+def test_negated_orientations_are_counted_the_other_way_round(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In the recordings to which a fit of a block that turns against the water is repeated."""
     time = np.arange(5.0)
-    (found,) = negated([build_trajectory(time, 0.1 * time, 0.2 * time, 0.3 * time)])
+    asked: list[xr.Dataset] = []
+
+    def fit(recordings: list[xr.Dataset], *_: Any, **__: Any) -> xr.Dataset:
+        asked.extend(recordings)
+        raise InputError("the recordings are enough")
+
+    monkeypatch.setattr(run, "fit_motion", fit)
+    monkeypatch.setattr(run, "described", lambda one: one)
+    attrs = {"kind": "fit", "study": coarse_study().to_toml(), "angle": "state"}
+    before = xr.Dataset({"spin_correlation": -0.5}, {"warning": ("warning", [])}, attrs)
+    recorded = build_trajectory(time, 0.1 * time, 0.2 * time, 0.3 * time)
+    run._with_angle_tried(before, xr.Dataset(), [recorded], body=None)
+    (found,) = asked
     assert found["theta"].values.ravel().tolist() == pytest.approx((-0.3 * time).tolist())
     assert found["x"].values.ravel().tolist() == pytest.approx((0.1 * time).tolist())

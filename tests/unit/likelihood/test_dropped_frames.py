@@ -14,6 +14,7 @@ from fit_worlds import coarse_study, fitted, recording
 from hypothesis import given, settings, strategies as st
 
 import driftwalk as dw
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.interval_inflation import with_mended_frames
 from driftwalk.likelihood.recording_artifacts import dropped_frames
 from driftwalk.likelihood.recording_artifacts.dropped_frames import (
@@ -219,9 +220,7 @@ def test_the_time_of_missing_frames_is_put_in() -> None:
     track = Track(time, time, time, time)
     expected = np.array([0.0, 1.0, 0.2, 0.0, 2.0])
     after = np.array([1, 4])
-    found = DroppedFrames(
-        after, time[after], np.array([1, 2]), np.ones(2), expected, 0.4, 50.0, 0.5
-    )
+    found = DroppedFrames(after, time[after], np.array([1, 2]), expected, 0.4, 50.0, 0.5)
     assert found.frames == 3
     wanted = time + 0.5 * np.array([0.0, 0.0, 1.0, 1.2, 1.2, 3.2])
     assert with_gaps(track, found).time == pytest.approx(wanted)
@@ -245,7 +244,9 @@ def test_stamps_of_a_constant_rate_may_be_rounded() -> None:
     assert dropped_frames._windows(lengths).tolist() == [*range(6), *range(13, 34)]
 
 
-def test_frames_of_a_short_recording_are_found_with_their_number() -> None:
+def test_frames_of_a_short_recording_are_found_with_their_number(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A wave of 0.1 m with 0.3 mm of noise: every fortieth frame, and twice two of them."""
     dropped = np.zeros(900, dtype=bool)
     dropped[50::40] = True
@@ -254,6 +255,14 @@ def test_frames_of_a_short_recording_are_found_with_their_number() -> None:
     noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, frame.size))
     x, y = 0.1 * np.cos(0.05 * frame) + noise[0], 0.1 * np.sin(0.05 * frame) + noise[1]
     clock = 0.1 * np.arange(frame.size)
+    shares: list[Floats] = []
+    share_of = dropped_frames._posterior
+
+    def posterior(*args: Floats) -> Floats:
+        shares.append(share_of(*args))
+        return shares[-1]
+
+    monkeypatch.setattr(dropped_frames, "_posterior", posterior)
     found = find_dropped_frames(Track(clock, x, y, np.full(frame.size, np.nan)), clock)
     gaps = np.diff(frame) - 1
     assert found.after.tolist() == np.flatnonzero(gaps).tolist()
@@ -261,7 +270,11 @@ def test_frames_of_a_short_recording_are_found_with_their_number() -> None:
     assert found.time.tolist() == clock[found.after].tolist()
     assert found.rate == pytest.approx(np.mean(gaps > 0), rel=0.2)
     assert found.expected == pytest.approx(gaps, abs=0.01)
-    assert (found.posterior > 0.99).all()
+    # The last round sees the true lengths, and has no doubt of any.
+    starts = dropped_frames._windows(np.diff(frame).astype(float))
+    assert len(shares[-1]) == starts.size
+    middle = np.searchsorted(starts, found.after - dropped_frames.MIDDLE)
+    assert (shares[-1].sum(axis=1)[middle] > 0.99).all()
     assert found.interval == pytest.approx(0.1)
     assert found.evidence > 2.0 * DROPPED.evidence
 

@@ -16,16 +16,10 @@ import driftwalk as dw
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood import measured_series
+from driftwalk.likelihood.check.criteria import agreement_criteria
+from driftwalk.likelihood.check.measured import _farthest, _tail
 from driftwalk.likelihood.filter.parameters import Amplitudes
-from driftwalk.likelihood.measured_flow import (
-    MeasuredFlow,
-    _farthest,
-    _least_squares,
-    _tail,
-    agreement_tests,
-    contradictions,
-    measured_flow,
-)
+from driftwalk.likelihood.measured_flow import MeasuredFlow, _least_squares, measured_flow
 from driftwalk.likelihood.measured_series import FLOW_CHANGE, amplitudes_in, compressed
 from driftwalk.likelihood.preparation import spline_of
 from driftwalk.likelihood.spline import Spline
@@ -152,17 +146,17 @@ def test_a_measured_flow_is_stored_and_said() -> None:
     assert flow.layers == 2
     size = 1e3 * math.sqrt(float(np.nanmean(flow.error**2)))
     assert flow.sentence.startswith(f"piv.nc: {there} vectors, errors of {size:.2g} mm/s as stated")
-    data, coords, words = flow.stored()
+    data, words = flow.stored()
     np.testing.assert_array_equal(data["measured_v"][1], flow.velocity[1])
     np.testing.assert_array_equal(data["measured_u_error"][1], flow.error[0])
-    assert set(coords) == {"measured_y", "measured_x"}
+    assert set(xr.Dataset(data).coords) == {"measured_y", "measured_x"}
     assert words["measured_flow"] == "piv.nc"
 
 
 def test_modes_are_stored_by_their_number() -> None:
     flow = flow_of(3)
     known = Amplitudes(np.arange(4.0), np.ones((2, 4)), "mirror")
-    data, _, words = replace(flow, amplitudes=known).stored()
+    data, words = replace(flow, amplitudes=known).stored()
     for k, name in enumerate("uv"):
         for end, values in (("", flow.velocity), ("_error", flow.error)):
             dims, found = data[f"measured_{name}_mode{end}"]
@@ -210,17 +204,22 @@ SCALED = {
 }
 
 
+def contradictions(facts: dict[str, Any]) -> list[str]:
+    """Return what a fit warns of: the findings of the criteria that fail."""
+    return [one.sentence for one in agreement_criteria(facts) if one.failed]
+
+
 def test_a_contradiction_is_said_with_its_place_and_size() -> None:
-    assert agreement_tests({}) == []
-    (one,) = agreement_tests(FACTS)
+    assert agreement_criteria({}) == []
+    (one,) = agreement_criteria(FACTS)
     assert (one.p_value, one.detectable) == (1e-5, 0.002)
     assert "chi squared of their difference 91, expected 40 ± 9" in one.sentence
     assert "x = 0.03 m, y = -0.04 m, where they are 12 mm/s apart" in one.sentence
-    flow, scale = agreement_tests(FACTS | SCALED)
+    flow, scale = agreement_criteria(FACTS | SCALED)
     assert "10 % too slow for the motion (± 1.4 %)" in scale.sentence
     assert (scale.p_value, scale.detectable) == (0.2, 0.05)
     assert contradictions(FACTS | SCALED) == [flow.sentence]
-    fast = agreement_tests(FACTS | SCALED | {"measured_flow_scale": 1.2})[1]
+    fast = agreement_criteria(FACTS | SCALED | {"measured_flow_scale": 1.2})[1]
     assert "20 % too fast" in fast.sentence
     assert contradictions(FACTS | {"measured_flow_p_value": 6e-4}) == []
 

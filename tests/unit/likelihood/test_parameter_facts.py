@@ -305,10 +305,11 @@ def test_a_stored_fit_gives_the_filter_its_numbers_back() -> None:
 
 
 def test_a_body_is_that_of_its_study() -> None:
-
     study = study_with()
     found = Body(study, "given")
     assert isinstance(found, Body)
-    assert (found.side, found.mass) == (study.block.side_m, study.block.mass_kg)
-    assert found.depth == study.wetted_depth_m
-    assert found.orientation == "given"
+    numbers = found.native(POINT)
+    assert (found.side, numbers["mass"]) == (study.block.side_m, study.block.mass_kg)
+    assert numbers["side"] == found.side
+    assert numbers["depth"] == study.wetted_depth_m
+    assert found.orientation == numbers["orientation"] == "given"

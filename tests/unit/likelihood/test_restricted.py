@@ -252,7 +252,8 @@ def test_the_force_is_corrected_by_a_newton_step_of_its_own_slope(
 
 
 def body() -> Any:
-    return SimpleNamespace(water_density=1000.0, side=0.03, depth=0.02, mass=0.012)
+    block, water = SimpleNamespace(side_m=0.03, mass_kg=0.012), SimpleNamespace(density_kg_m3=1e3)
+    return SimpleNamespace(study=SimpleNamespace(block=block, water=water, wetted_depth_m=0.02))
 
 
 def tracks(generator: np.random.Generator, flows: int) -> tuple[list[Series], list[Floats]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -64,9 +63,9 @@ def ready(one: Track, *, side: float = 0.03, angle: str = "state") -> Any:
 def test_the_first_noises_go_with_the_units(monkeypatch: pytest.MonkeyPatch) -> None:
     """q has m^2/s^3, r m; the angle has none."""
     monkeypatch.setattr(start, "_first_coefficients", lambda *_: np.zeros((2, 6, 6)))
-    plain = first_point(ready(track()), SPLINE)
-    long = first_point(ready(track(2.0), side=0.06), SPLINE)
-    slow = first_point(ready(track(1.0, 3.0)), SPLINE)
+    plain = first_point(ready(track()))
+    long = first_point(ready(track(2.0), side=0.06))
+    slow = first_point(ready(track(1.0, 3.0)))
     assert plain.log_drag == math.log(PRIOR.drag)
     for other, length, time in ((long, 2.0, 1.0), (slow, 1.0, 3.0)):
         shift = math.log(length**2 / time**3)
@@ -81,7 +80,7 @@ def test_the_first_noises_go_with_the_units(monkeypatch: pytest.MonkeyPatch) -> 
     # Rather too large than too small: a tenth of U^3 / a.
     speed = 0.05 * 0.8
     assert 0.05 < math.exp(plain.log_intensity) * 0.03 / speed**3 < 0.3
-    without = first_point(ready(track(), angle="none"), SPLINE)
+    without = first_point(ready(track(), angle="none"))
     assert without.log_lever is without.log_angle_noise is None
 
 
@@ -95,12 +94,12 @@ def test_a_floating_body_begins_with_other_forces(monkeypatch: pytest.MonkeyPatc
     """And with the flow that the body follows."""
     asked: list[str] = []
 
-    def coefficients(_: Any, study: Any, __: Any) -> np.ndarray:
+    def coefficients(_: Any, study: Any) -> np.ndarray:
         asked.append(study.flow.inertia)
         return np.full((2, 6, 6), float(len(asked)))
 
     monkeypatch.setattr(start, "_first_coefficients", coefficients)
-    found = first_points(ready(track()), SPLINE)
+    found = first_points(ready(track()))
     assert asked[1] == "none" != asked[0]
     assert (found.paper.coefficients == 1.0).all()
     for one, factor in zip(found.floating, INITIAL_VALUES.floating_intensity_factors, strict=True):
@@ -130,12 +129,21 @@ def test_each_flow_begins_with_the_longest_stretch_in_it(monkeypatch: pytest.Mon
     parts = [Track(*(axis[a:b] for axis in whole)) for a, b in ((0, 100), (100, 300), (300, 600))]
     intervals = SimpleNamespace(steady=False, labels=("A", "B"))
     several: Any = SimpleNamespace(
-        intervals=intervals, places=[(0, 0), (1, 0), (0, 0)], parts=parts, measured=None
+        intervals=intervals,
+        places=[(0, 0), (1, 0), (0, 0)],
+        parts=parts,
+        measured=None,
+        passes=SimpleNamespace(spline=SPLINE),
     )
-    monkeypatch.setattr(
-        start, "_flow_coefficients", lambda one, *_: np.full((2, 1, 1), float(one.time.size))
-    )
-    found = start._first_coefficients(several, study, SPLINE)
+    splines: list[Spline] = []
+
+    def coefficients(one: Track, _: Any, spline: Spline, *__: Any) -> np.ndarray:
+        splines.append(spline)
+        return np.full((2, 1, 1), float(one.time.size))
+
+    monkeypatch.setattr(start, "_flow_coefficients", coefficients)
+    found = start._first_coefficients(several, study)
     assert found[:, 0, 0, 0].tolist() == [300.0, 200.0]
-    steady = start._first_coefficients(replace(made), study, spline_of(study))
+    steady = start._first_coefficients(made, study)
     assert steady[0, 0, 0] == whole.time.size
+    assert splines == [SPLINE, SPLINE, spline_of(study)]

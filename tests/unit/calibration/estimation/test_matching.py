@@ -269,7 +269,7 @@ def test_where_the_first_end_matches_no_other_start_is_tried(
     hopeless = Searches(monkeypatch, MATCHING.no_restart_above + 1.0)
     assert hopeless.found(FAR) == [0]
     given = Searches(monkeypatch, 21.0)
-    assert given.found(FAR, no_restart_above=20.0, give_up=20.0) == [0]
+    assert given.found(FAR, give_up=20.0) == [0]
     assert given.begun[0][-1] == 20.0
 
 

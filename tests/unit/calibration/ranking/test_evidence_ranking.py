@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from driftwalk.calibration.estimation.summaries import SummaryObjective
 from driftwalk.calibration.estimation.synthetic_likelihood import SyntheticLikelihood
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore, without_error
@@ -138,14 +139,23 @@ class Asked:
     own = np.linspace(90.0, 140.0, 101)
 
     def __init__(self, patch: pytest.MonkeyPatch, discrepancy: float) -> None:
-        self.recorded = np.array([[1.0, 2.0]])
-        self.done = 0
-        self.worlds = SimpleNamespace(simulated=self.simulated)
+        self.worlds = SimpleNamespace(simulated=self.simulated, seed=3)
         self.at: list[np.ndarray] = []
         self.most = 0
         best = SimpleNamespace(setting=np.array([-0.2, 0.3, 1.4]), log_volume=-9.0)
-        patch.setattr(model_evidence, "even_blocks", lambda *_: "even")
-        patch.setattr(model_evidence, "SummaryObjective", self.made)
+        patch.setattr(model_evidence, "even_blocks", lambda *_: self.worlds)
+
+        def made(objective: Any, worlds: Any, *_: Any, **named: Any) -> None:
+            objective.worlds, objective.done = worlds, 0
+            objective.recorded = np.array([[1.0, 2.0]])
+            self.most = named["most"]
+
+        def summaries(_: Any, settings: np.ndarray, *, parts: int = 1) -> np.ndarray:
+            return np.full((len(settings), parts, 2), 5.0)
+
+        # The noise is added in a subclass.
+        patch.setattr(SummaryObjective, "__init__", made)
+        patch.setattr(SummaryObjective, "__call__", summaries)
         patch.setattr(model_evidence, "label_order", lambda _: None)
         patch.setattr(
             model_evidence, "find_optima", lambda *_, **__: [SimpleNamespace(solution=best)]
@@ -161,13 +171,6 @@ class Asked:
         patch.setattr(model_evidence, "synthetic_likelihood_at", likelihood)
         patch.setattr(model_evidence, "score_setting", lambda worlds, motion, at: ("score", at))
         patch.setattr(model_evidence, "bout_distances", lambda motion, worlds: worlds)
-
-    def made(self, *_: Any, **named: Any) -> Asked:
-        self.most = named["most"]
-        return self
-
-    def __call__(self, settings: np.ndarray, *, parts: int = 1) -> np.ndarray:
-        return np.full((len(settings), parts, 2), 5.0)
 
     def simulated(self, settings: np.ndarray, replicates: int, *, stage: str) -> Any:
         return (settings.tolist(), replicates, stage)

@@ -303,7 +303,7 @@ def test_the_last_sample_of_a_section_is_not_shown(
     sound = np.array([True, False, True])
     monkeypatch.setattr(made, "_poses", lambda *_: (poses, sound))
     keys = np.arange(9).reshape(3, 3)
-    found = made._simulated(one, keys, 0.4, 7e-4, POINT, 5.0, with_path=with_path)
+    found = made._simulated(one, keys, 0.4, 7e-4, POINT, 5.0 if with_path else None)
     if not with_path:
         assert [one.sound for one in found] == [True, False, False]
         assert [one.path for one in found] == [None] * 3

@@ -212,7 +212,8 @@ def test_the_likelihood_of_a_body_that_nothing_pushes_is_that_of_its_path(
 
     def drift(_: Any, study: Any, state: Any, keys: Any, step: float) -> Any:
         assert keys.size == state[0].size
-        return [one + 0.1 * rate for one, rate in zip(state[:3], state[3:], strict=True)], state[3:]
+        pose = [one + 0.1 * rate for one, rate in zip(state[:3], state[3:], strict=True)]
+        return [*pose, *state[3:]]
 
     monkeypatch.setattr(particles, "_propagated", drift)
     state = np.array([[0.0, 0.01, 0.1, 0.02, -0.01, 0.3], [0.05, 0.0, 1.0, 0.0, 0.0, 0.0]])

@@ -172,7 +172,6 @@ def test_of_two_shapes_of_the_drag_the_surer_one_is_opened() -> None:
     assert list(selection_of()._candidates(tests, None)) == ["linear_share"]
     # The numbers of a floating body are those of another law.
     assert selection_of()._candidates(trial_of(dict.fromkeys(FLOATING, 50.0)), None) == {}
-    assert selection_of()._candidates(None, None) == {}
 
 
 @pytest.mark.parametrize(
@@ -281,17 +280,32 @@ def test_errors_of_line_and_cosines_that_go_together_count_as_one() -> None:
     assert not selection_of()._has_changed(replace(mode, covariance=covariance))
 
 
-def test_one_shape_of_the_drag_at_most_is_tried() -> None:
+def test_one_shape_of_the_drag_at_most_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     selection = selection_of(tried=("linear_share", "drag_power", "marker_x", "force_memory"))
-    assert selection._closed_names(mode_with(), {"force_memory"}) == [
+    selection.search = object()
+    asked: list[tuple[Any, Mode]] = []
+
+    def test(search: Any, mode: Mode, names: list[str]) -> ScoreTests:
+        asked.append((search, mode))
+        return trial_of(dict.fromkeys(names, 0.0))
+
+    def closed_names(mode: Mode, closed: set[str]) -> list[str]:
+        found = selection._tests_of_closed(mode, closed)
+        assert asked.pop() == (selection.search, mode)
+        return list(found.names)
+
+    monkeypatch.setattr(forward_selection, "score_tests", test)
+    assert closed_names(mode_with(), {"force_memory"}) == [
         "linear_share", "drag_power", "marker_x",
     ]  # fmt: skip
-    assert selection._closed_names(mode_with(drag_power=1.7), set()) == [
+    assert closed_names(mode_with(drag_power=1.7), set()) == [
         "marker_x", "force_memory",
     ]  # fmt: skip
-    assert selection._closed_names(mode_with(marker_x=0.0, linear_share=0.1), set()) == [
-        "force_memory"
-    ]
+    assert closed_names(mode_with(marker_x=0.0, linear_share=0.1), set()) == ["force_memory"]
+    # Without a closed number there is nothing to test.
+    last = mode_with(marker_x=0.0, linear_share=0.1)
+    assert selection._tests_of_closed(last, {"force_memory"}) is None
+    assert asked == []
 
 
 class Rounds:
@@ -350,6 +364,19 @@ def test_numbers_are_opened_round_by_round(monkeypatch: pytest.MonkeyPatch) -> N
     more.select(mode_with())
     assert len(more.rounds) == 6
     assert len(more.tested) == 4
+
+
+def test_where_the_score_tests_break_down_nothing_is_opened(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rounds = Rounds(monkeypatch, {"marker_x": 0.02})
+    monkeypatch.setattr(forward_selection, "score_tests", lambda *_: None)
+    before = mode_with()
+    found = rounds.select(before)
+    assert found.mode is before
+    assert found.tests is None
+    assert rounds.pulses == 0
+    assert rounds.rounds == [{"marker_x": 0.02}]
 
 
 def test_pulses_are_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:

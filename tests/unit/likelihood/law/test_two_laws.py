@@ -272,6 +272,12 @@ def opened(value: float = 0.2, **more: float) -> Point:
     return replace(PLAIN, opened={"marker_x": value, **more})
 
 
+def turning(evidence: float) -> LawResult:
+    """Return a law without departures, of which something turns the block."""
+    mode = mode_at(replace(PLAIN, log_lever=math.log(3e-4)), evidence)
+    return LawResult(mode, mode, False, {}, 5.0, None)
+
+
 @pytest.mark.parametrize(
     ("settled_by", "sigmas", "other", "turned"),
     [
@@ -335,6 +341,8 @@ def test_what_is_unchanged_or_stated_is_not_compared_again(
         (10.0, 10.0, 10.0 + LEAST, False),
         (10.0, 20.0, 22.9, False),
         (10.0, 20.0, 23.1, True),
+        (20.0, 10.0, 22.9, False),
+        (20.0, 10.0, 23.1, True),
     ],
 )
 def test_a_power_of_the_drag_is_taken_where_it_is_ahead_of_both(
@@ -342,12 +350,11 @@ def test_a_power_of_the_drag_is_taken_where_it_is_ahead_of_both(
 ) -> None:
     """Of the plain law, and of the law with the departures that were found."""
     laws = Laws(monkeypatch, power, power)
+    laws.assume("auto", tried=["drag_power"])
     laws.search.selection.least = {}
-    first, second = (
-        LawResult(mode_at(point, one), mode_at(point, one), False, {}, 5.0, None)
-        for point, one in ((PLAIN, base), (opened(), found))
-    )
-    result = laws.search._powered(first, second, STARTS, WEIGHTS)
+    first, mode = turning(base), mode_at(opened(), found)
+    second = LawResult(mode, mode, False, {}, 5.0, None)
+    result = laws.search._powered(second, first, STARTS, WEIGHTS)
     assert (result is not second) is taken
     (call,) = laws.calls
     assert call[1].opened == {"drag_power": 1.7}
@@ -356,17 +363,31 @@ def test_a_power_of_the_drag_is_taken_where_it_is_ahead_of_both(
         assert result.noted == ("chosen",)
 
 
+@pytest.mark.parametrize(("tried", "turns"), [(["marker_x"], True), (["drag_power"], False)])
+def test_no_power_of_the_drag_is_looked_for_where_it_is_stated_or_nothing_turns(
+    monkeypatch: pytest.MonkeyPatch, tried: list[str], turns: bool
+) -> None:
+    laws = Laws(monkeypatch, 99.0, 99.0)
+    laws.assume("auto", tried=tried)
+    mode = mode_at(PLAIN, 10.0)
+    base = turning(10.0) if turns else LawResult(mode, mode, False, {}, 5.0, None)
+    found = replace(base, mode=mode_at(opened(), 10.0))
+    assert laws.search._powered(found, base, STARTS, WEIGHTS) is found
+    assert laws.calls == []
+
+
 def test_a_power_that_is_near_two_is_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """Retained is what is three standard deviations of 0.1 from 2."""
     laws = Laws(monkeypatch, 50.0, 50.0)
+    laws.assume("auto", tried=["drag_power"])
     laws.search.selection.least = {}
-    base = LawResult(mode_at(PLAIN, 10.0), mode_at(PLAIN, 10.0), False, {}, 5.0, None)
+    base = turning(10.0)
     for value, there in ((1.69, True), (1.71, False), (2.29, False), (2.31, True)):
         near = replace(PLAIN, opened={"drag_power": value})
         laws.search.search.find_from_afar = lambda point, _, near=near: mode_at(near, 50.0)  # type: ignore[method-assign]
-        assert (laws.search._with_power(base, STARTS, WEIGHTS) is not None) is there
+        assert (laws.search._powered(base, base, STARTS, WEIGHTS) is not base) is there
     laws.search.search.find_from_afar = lambda *_: mode_at(opened(), 50.0, converged=False)  # type: ignore[method-assign]
-    assert laws.search._with_power(base, STARTS, WEIGHTS) is None
+    assert laws.search._powered(base, base, STARTS, WEIGHTS) is base
 
 
 @pytest.mark.parametrize(
@@ -440,10 +461,19 @@ def test_numbers_that_something_else_explains_are_closed(
 ) -> None:
     laws = Laws(monkeypatch, 10.0, 10.0)
     plain, mode = mode_at(PLAIN, 3.0), mode_at(opened(0.2, drag_power=2.4), 10.0)
-    laws.search.confounders = SimpleNamespace(objections=lambda *_: left)  # type: ignore[assignment]
+    laws.search.undisturbed = lambda: []
+    asked: list[Any] = []
+
+    def objections(*known: Any) -> dict[str, str]:
+        asked.append(known)
+        return left
+
+    monkeypatch.setattr(search, "objections_to", objections)
     laws.search.selection.without = lambda *_: None  # type: ignore[method-assign]
     before = LawResult(mode, plain, False, {}, 5.0, None, unsettled=("first",))
     found = laws.search._supported(before)
+    # Of the numbers of the law alone.
+    assert asked == [(mode, ["drag_power"], laws.search.selection, laws.search.undisturbed)]
     if not closed:
         assert found is before
         return
@@ -526,11 +556,12 @@ def test_a_search_that_breaks_down_leaves_what_was_found(monkeypatch: pytest.Mon
     mode = mode_at(PLAIN, 10.0)
     before = LawResult(mode, mode, False, {}, 5.0, None, left_out=("one",))
 
-    def breaks() -> LawResult:
+    def breaks(law: LawResult) -> LawResult:
+        assert law is before
         raise np.linalg.LinAlgError
 
     assert laws.search._try_search(before, "two", breaks).left_out == ("one", "two")
     further = replace(before, floating=True, left_out=())
-    found = laws.search._try_search(before, "two", lambda: further)
+    found = laws.search._try_search(before, "two", lambda _: further)
     assert found.floating
     assert found.left_out == ("one",)
