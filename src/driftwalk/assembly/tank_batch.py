@@ -390,13 +390,15 @@ class TankBatch:
         self._resting = self._rests & (state["assembly"] == 0).all(axis=1)
         for world in np.flatnonzero(changed).tolist():
             own = {name: values[world] for name, values in state.items()}
-            address = own["assembly"].tobytes() + own["cell"].tobytes()
             if not sound[world]:
                 self._outcome[world] = ""
-            elif self._study.block.has_lattice and address in self._names:
-                self._outcome[world] = self._names[address]
+            elif not self._study.block.has_lattice:
+                self._outcome[world] = state_class(own, self._study)
             else:
-                self._outcome[world] = self._names[address] = state_class(own, self._study)
+                address = own["assembly"].tobytes() + own["cell"].tobytes()
+                if address not in self._names:
+                    self._names[address] = state_class(own, self._study)
+                self._outcome[world] = self._names[address]
 
     def _require_lattice(self, given: Floats) -> None:
         """Refuse a start beyond the tank, or off the lattices of its assemblies."""

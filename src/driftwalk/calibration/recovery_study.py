@@ -58,6 +58,10 @@ class EstimationMethod(SweepStudy["xr.Dataset"], Generic[RecordingT]):
         return lambda done, total: tell(self.parts * done, self.parts * total, self.work)
 
     @abstractmethod
+    def check(self) -> None:
+        """Raise what forbids the whole study."""
+
+    @abstractmethod
     def simulate(self, setting: Mapping[str, Any]) -> RecordingT:
         """Return what the camera records in a setting, or raise `BrokenSimulation`."""
 

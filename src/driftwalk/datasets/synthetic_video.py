@@ -248,7 +248,8 @@ class _Painter:
             seen = np.ones(len(self.points), dtype=bool)
             for other in np.flatnonzero(np.isfinite(self.bars.offset[index])):
                 own = self._to_marker(self.poses[index, other], world)
-                seen &= self.bars.depth(index, int(other), own) <= 0.0
+                # NaN where that body has a gap: it hides nothing.
+                seen &= ~(self.bars.depth(index, int(other), own) > 0.0)
             pixels = world_to_image(self.settings, world)
             limit = np.array([self.settings.width_px, self.settings.height_px]) - 0.5
             seen &= ((pixels > -0.5) & (pixels < limit)).all(axis=-1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from hashlib import sha256
 from pathlib import Path
@@ -342,9 +341,12 @@ class SensitivityWork:
             self.study, self.flow, axes=self.axes, reference=reference, **how("map", "map")
         )
         found = run.keep_result(found)
-        # There are none where there is one setting or all are alike.
-        with suppress(InputError):
-            run.keep("components.nc", principal_components(found))
+        try:
+            components = principal_components(found)
+        except InputError:
+            pass  # One setting, or all are alike: there are none.
+        else:
+            run.keep("components.nc", components)
         if self.samples is not None:
             indices = sensitivity_indices(
                 self.study, self.flow, samples=self.samples, **how("sobol", "Sobol")

@@ -225,6 +225,8 @@ COMMON: Final = {
 }
 """Attributes of many kinds, by the name under which their texts list them."""
 
+# No space within the brackets: "p < 0.05, |r| > 2" holds no choice.
+_CHOICES: Final = re.compile(r"<(\S[^<>]*\|[^<>]*(?<! ))>")
 _HEAD: Final = re.compile(r"(dimensions|variables|attributes)(?: \((.+)\))?:")
 _VARIABLE: Final = re.compile(
     r"(?P<name>\w+)(?:\((?P<dims>.*?)\))?(?: \[(?P<units>.*?)\])?"
@@ -308,9 +310,15 @@ def _rows_of(text: str) -> dict[str, list[tuple[str, str]]]:
 
 def _chosen(row: str) -> list[str]:
     """Return the rows that one with choices is read as, else itself alone."""
-    parts = [part.split("|") for part in re.split("[<>]", row)]
-    count = max(map(len, parts))
-    return ["".join(words[n % len(words)] for words in parts) for n in range(count)]
+    found = [choices.split("|") for choices in _CHOICES.findall(row)]
+    if len({len(words) for words in found}) > 1:
+        raise ValueError(f"not as many words in each choice: {row}")
+    rest = _CHOICES.split(row)[::2]
+    rows = [
+        "".join(part for pair in zip(rest, (*words, ""), strict=True) for part in pair)
+        for words in zip(*found, strict=True)
+    ]
+    return rows or [row]
 
 
 def _variable(row: str, when: str, flags: Mapping[str, Mapping[str, int]]) -> Variable:

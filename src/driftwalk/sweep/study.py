@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,10 @@ class SweepStudy(ABC, Generic[ResultT]):
 
     Recovery studies, sensitivity analyses and the nodes of an emulator are such studies.
     """
+
+    names_units: ClassVar[bool] = True
+    """Whether an error names the work unit that failed. Where any setting may show a mistake of the
+    user, that is raised as it is."""
 
     def check(self) -> None:
         """Raise what forbids the whole study, before anything is computed."""
@@ -57,9 +61,9 @@ class SweepStudy(ABC, Generic[ResultT]):
         Raises
         ------
         InputError
-            As `check`, or when a setting shows a mistake of the user.
+            As `check`; without `names_units` also when a setting shows a mistake of the user.
         SweepError
-            When the computation of a setting fails otherwise.
+            When the computation of a setting fails; names its work unit.
         """
         self.check()
         design = self.design()
@@ -72,8 +76,7 @@ class SweepStudy(ABC, Generic[ResultT]):
                 progress=progress,
             )
         except SweepError as error:
-            # The user's mistake, whichever setting shows it.
-            if isinstance(error.__cause__, DriftwalkError):
+            if not self.names_units and isinstance(error.__cause__, DriftwalkError):
                 raise error.__cause__ from None
             raise
         return self.result(design.unstack(found))
@@ -99,7 +102,11 @@ class _TextStore:
 
     def read(self, unit: Unit) -> Arrays:
         """Return what was kept for a unit."""
-        return {
-            name: np.char.decode(values).astype(object) if values.dtype.kind == "S" else values
-            for name, values in self._inner.read(unit).items()
-        }
+        return {name: _with_text(values) for name, values in self._inner.read(unit).items()}
+
+
+def _with_text(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return text as objects, from bytes or as it is."""
+    if values.dtype.kind == "S":
+        values = np.char.decode(values)
+    return values.astype(object) if values.dtype.kind == "U" else values

@@ -1,4 +1,4 @@
-"""`driftwalk fit DIMER --body-shape xx --from FIT`: hidden drag, shared stirring, and their use."""
+"""`driftwalk fit DIMER --earlier-fit FIT`: hidden drag, shared stirring, and their use."""
 
 from __future__ import annotations
 

@@ -59,3 +59,5 @@ def test_files_of_other_kinds_and_options_of_recordings(tmp_path: Path) -> None:
     assert "C_d" in here("info", run).out
     line = refusal(here("info", run, "--fps", "3"))
     assert line.endswith(f"--fps: for a recording; {run} is a directory, read as a run\n")
+    line = refusal(here("info", run, "--replicate", "0"))
+    assert line.endswith(f"--replicate: for a recording; {run} is a directory, read as a run\n")

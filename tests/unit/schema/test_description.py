@@ -58,6 +58,10 @@ def test_a_row_with_choices_stands_for_one_row_of_each() -> None:
     ]
     [x, y] = attributes("<x|y>_m number: place")
     assert (x.name, y.name) == ("x_m", "y_m")
+    [plain] = attributes("p number: p < 0.05, |r| > 2 and {1} <1>")
+    assert plain.meaning == "p < 0.05, |r| > 2 and {1} <1>"
+    with pytest.raises(ValueError, match="not as many words"):
+        attributes("<x|y>_m number: <first|second|third> place")
 
 
 def test_bits_may_be_set_together() -> None:

@@ -18,6 +18,7 @@ class Words(SweepStudy["dict[str, list[list[str]]]"]):
     """Words of a length by row and column; some settings fail."""
 
     fault: Exception | None = None
+    names_units: bool = False
 
     def check(self) -> None:
         if isinstance(self.fault, FileNotFoundError):
@@ -52,11 +53,26 @@ def test_results_have_the_dimensions_of_the_design(tmp_path: Path) -> None:
     assert Words().sweep() == found
 
 
-@pytest.mark.parametrize("fault", [InputError("no room for the blocks"), ValueError("a bug")])
-def test_a_mistake_of_the_user_is_raised_as_it_is(fault: Exception) -> None:
-    with pytest.raises(InputError if isinstance(fault, InputError) else SweepError) as caught:
-        Words(fault).sweep()
+BUG, MISTAKE = ValueError("a bug"), InputError("no room for the blocks")
+
+
+@pytest.mark.parametrize(
+    ("fault", "names_units", "raised"),
+    [(MISTAKE, False, InputError), (MISTAKE, True, SweepError), (BUG, False, SweepError)],
+)
+def test_a_mistake_of_the_user_is_raised_as_it_is_where_no_unit_is_named(
+    fault: Exception, names_units: bool, raised: type[Exception]
+) -> None:
+    with pytest.raises(raised) as caught:
+        Words(fault, names_units).sweep()
     assert fault in (caught.value, caught.value.__cause__)
+
+
+def test_texts_of_fixed_length_are_continued(tmp_path: Path) -> None:
+    store = ShardStore(tmp_path, fingerprint={})
+    first = Words().design().units(4)[0]
+    store.write(first, {"word": Words()(first)["word"].astype("U400")})
+    assert Words().sweep(store=store) == Words().sweep()
 
 
 def test_what_forbids_the_study_is_found_before_anything_is_computed(tmp_path: Path) -> None:

@@ -170,3 +170,17 @@ def test_a_colour_that_never_appears_is_said_with_what_was_seen() -> None:
     grey = np.full((48, 64, 3), 90, np.uint8)
     with pytest.raises(InputError, match="all is grey"):
         dw.track.propose_markers([grey], camera_of(settings))
+
+
+def test_a_bar_of_a_body_that_is_not_there_hides_nothing() -> None:
+    """A bar may be placed in time where its body has a gap; nothing is painted there."""
+    settings = dw.datasets.VideoSettings(bar_share=0.5, bar_time_share=0.9, glare_share=0.0)
+    blocks = moving_blocks(16, bodies=2)
+    for name in ("x", "y", "theta"):
+        blocks[name].values[10:, 1] = np.nan
+    whole, alone = (
+        dw.video_truth(one, settings)["visible"].values[10:, 0]
+        for one in (blocks, blocks.isel(body=[0]))
+    )
+    assert np.array_equal(whole, alone)
+    assert whole.max() > 0.0

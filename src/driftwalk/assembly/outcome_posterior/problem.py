@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -76,6 +76,8 @@ class Nodes(SweepStudy["list[list[Record]]"]):
     value: Floats
     first_trial: int
     threads: int | None = None
+
+    names_units: ClassVar = False
 
     def __call__(self, unit: WorkUnit) -> Arrays:
         """Return the records of the runs of each node of a unit, as text."""

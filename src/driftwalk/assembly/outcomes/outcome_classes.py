@@ -476,7 +476,7 @@ def contact_pairs(
     from scipy.spatial import cKDTree
 
     # A broken world has lost some of its bodies.
-    seen = np.flatnonzero(np.isfinite(places).all(axis=1))
+    seen = np.flatnonzero(np.isfinite(places[:, : 2 if width is None else 3]).all(axis=1))
     longest = max(diameter, width or 0.0)
     # Beyond a diagonal and the gap, and rounding, none touch.
     reach = math.hypot(diameter, width or 0.0) + 2.0 * BODY_CONTACT.gap * longest

@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -160,6 +160,8 @@ class OutcomeStudy(SweepStudy["xr.Dataset"]):
     """The outcomes of settings of self-assembly, and a dataset of them."""
 
     settings: Settings
+
+    names_units: ClassVar = False
 
     def check(self) -> None:
         """Refuse blocks that find no place in the tank."""

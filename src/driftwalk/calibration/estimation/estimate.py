@@ -157,11 +157,12 @@ def find_optima(
     """Return the ends of the searches that are worth a posterior, the most likely first.
 
     The arguments are as of `match_summaries`, with a limit on the discrepancy in summaries: above
-    it a search is given up (see `minimise_discrepancy`), and no other start is tried. The first
-    search begins where a regression puts the parameters. Even where its errors are large, its
-    centre is closer to the truth than they say: they come mostly from settings that move unlike the
-    recording. Where the end does not match, the model has more than one place to look, and an end
-    that matches may not be the best that does.
+    it a search is given up (see `minimise_discrepancy`), and above it, or above
+    `MATCHING.no_restart_above`, no other start is tried. The first search begins where a regression
+    puts the parameters. Even where its errors are large, its centre is closer to the truth than
+    they say: they come mostly from settings that move unlike the recording. Where the end does not
+    match, the model has more than one place to look, and an end that matches may not be the best
+    that does.
     """
     recorded = objective.recorded[0]
     regression = sequential_regression(

@@ -126,7 +126,7 @@ class RunningCalibration(Running):
             if stage == "refined":
                 self._refined = of_map
             for unit in reader.new_units():
-                changed |= self._take_of(name, stage, unit)
+                changed |= self._changed_by(name, stage, unit)
         made = {"map": self._map_section, "bootstrap": self._bootstrap_section}
         return [made[name]() for name in sorted(changed, reverse=True)]
 
@@ -166,7 +166,7 @@ class RunningCalibration(Running):
             "ks_turning_angle": float(kept["ks_turning_angle"][nearest]),
         }
 
-    def _take_of(self, name: str, stage: str, unit: FinishedUnit) -> set[str]:
+    def _changed_by(self, name: str, stage: str, unit: FinishedUnit) -> set[str]:
         """Take a work unit, and return the sections that it changes."""
         if name.startswith(MORE):
             self._more_done[stage] += unit.stop - unit.start

@@ -55,10 +55,11 @@ class Running:
 
     def look(self) -> list[Section]:
         """Read what is new, and return the sections that it may have changed."""
-        units = list(self._reader.new_units(self._sweeps))
-        for name, unit in units:
+        new = False
+        for name, unit in self._reader.new_units(self._sweeps):
             self._take(name, unit)
-        return self.sections() if units else []
+            new = True
+        return self.sections() if new else []
 
     def _take(self, name: str, unit: FinishedUnit) -> None:  # noqa: ARG002
         """Take a finished unit of a sweep."""

@@ -13,6 +13,7 @@ from driftwalk.likelihood import FitRecovery, recovery as recovery_run
 from driftwalk.model import apply_overrides
 from driftwalk.model.recover import true_time_step_s
 from driftwalk.schema.answers.facts import facts_of
+from driftwalk.sweep import SweepError
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +156,7 @@ def test_what_cannot_be_fitted_is_data() -> None:
 
 def test_a_block_for_which_there_is_no_start_is_refused(flow: xr.Dataset) -> None:
     study = apply_overrides(small_study(durations_s=[60.0]), {"block.side_m": 0.212})
-    with pytest.raises(InputError, match="no start pose was found"):
+    with pytest.raises(SweepError, match="no start pose was found"):
         dw.recovery_study(study, flow)
 
 
