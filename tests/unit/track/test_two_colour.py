@@ -174,7 +174,9 @@ def test_a_colour_that_never_appears_is_said_with_what_was_seen() -> None:
 
 def test_a_bar_of_a_body_that_is_not_there_hides_nothing() -> None:
     """A bar may be placed in time where its body has a gap; nothing is painted there."""
-    settings = dw.datasets.VideoSettings(bar_share=0.5, bar_time_share=0.9, glare_share=0.0)
+    settings = dw.datasets.VideoSettings(
+        width_px=320, height_px=240, px_per_m=750.0, bar_share=0.5, bar_time_share=0.9
+    )
     blocks = moving_blocks(16, bodies=2)
     for name in ("x", "y", "theta"):
         blocks[name].values[10:, 1] = np.nan
